@@ -1,0 +1,43 @@
+"""What every test is held to: no descriptor left behind, and Hypothesis without a stopwatch."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+# Durations are no property of the code on a machine that is shared: no deadline anywhere.
+settings.register_profile("dev", deadline=None)
+settings.register_profile(
+    "ci", deadline=None, max_examples=400, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("dev")
+
+_DESCRIPTORS = Path("/proc/self/fd")
+
+
+def open_descriptors() -> dict[str, str]:
+    """Descriptor to what it is open on; empty where the system does not tell."""
+    found = {}
+    if _DESCRIPTORS.is_dir():
+        for entry in _DESCRIPTORS.iterdir():
+            try:
+                found[entry.name] = str(entry.readlink())
+            except FileNotFoundError:  # the directory's own descriptor, closed by now
+                continue
+    return found
+
+
+@pytest.fixture(autouse=True)
+def _no_descriptor_left_behind() -> Iterator[None]:
+    before = open_descriptors()
+    yield
+    after = open_descriptors()
+    if len(after) > len(before):
+        gc.collect()  # what only a reference cycle held is garbage, not a leak
+        after = open_descriptors()
+    left = {number: target for number, target in after.items() if number not in before}
+    assert len(after) <= len(before), f"descriptors left open: {left}"
