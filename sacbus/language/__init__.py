@@ -23,6 +23,10 @@ from .commands import (
     Stop,
     Velocity,
 )
+from .describe import describe
+from .grammar import Parsed, parse
+from .line import Remark
+from .repeat import repeatable
 from .session import Defaults, Motion, Session
 
 __all__ = [
@@ -39,11 +43,16 @@ __all__ = [
     "Motion",
     "Move",
     "Next",
+    "Parsed",
     "ReleaseSync",
+    "Remark",
     "Session",
     "ShowVelocity",
     "SinglePulses",
     "SoftOp",
     "Stop",
     "Velocity",
+    "describe",
+    "parse",
+    "repeatable",
 ]

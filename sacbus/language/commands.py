@@ -119,10 +119,10 @@ class Move:
 class Velocity:
     """``V``: the session's velocity, as RPM (BARE = the default cycle) or as a cycle in us.
 
-    At most one of the two is set. While continuous motion runs it also re-targets that motion.
+    Exactly one of the two is set. While continuous motion runs it also re-targets that motion.
     """
 
-    rpm: int | Bare = BARE
+    rpm: int | Bare | None = BARE
     cycle_us: int | None = None
 
     def text(self) -> str:

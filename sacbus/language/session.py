@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Self
 
 from .commands import BARE, Acceleration, Bare, Deceleration, Move, Velocity
+from .values import maker
 
 __all__ = ["Defaults", "Motion", "Session"]
 
@@ -71,11 +72,11 @@ class Defaults:
         """RPM of a cycle >= 1 us, truncated: 4567 gives 65 (manual, "V")."""
         return _US_PER_MINUTE // (self.sprf * cycle_us)
 
-    def acc_of(self, linear: bool) -> int:
+    def acc_of(self, *, linear: bool) -> int:
         """System acceleration of a ramp, in hundredths."""
         return self.linear_acc100 if linear else self.acc100
 
-    def dec_of(self, linear: bool) -> int:
+    def dec_of(self, *, linear: bool) -> int:
         """System deceleration of a ramp, in hundredths."""
         return self.linear_dec100 if linear else self.dec100
 
@@ -105,8 +106,8 @@ class Session:
         return cls(
             defaults.rpm_of(defaults.cycle_us),
             defaults.cycle_us,
-            defaults.acc_of(defaults.linear),
-            defaults.dec_of(defaults.linear),
+            defaults.acc_of(linear=defaults.linear),
+            defaults.dec_of(linear=defaults.linear),
             defaults.linear,
             defaults.full_step,
             defaults,
@@ -132,12 +133,12 @@ class Session:
             if dec100 is None:
                 dec100 = self.dec100
         if acc100 is None or acc100 is BARE:
-            acc100 = defaults.acc_of(linear)
+            acc100 = defaults.acc_of(linear=linear)
         if dec100 is None or dec100 is BARE:
-            dec100 = defaults.dec_of(linear)
+            dec100 = defaults.dec_of(linear=linear)
         rpm, cycle_us = self._velocity(move.rpm, move.cycle_us)
         pulses = move.pulses
-        motion = Motion(
+        motion = _make_motion(
             move.steps or None,
             defaults.cw is not move.opposite,
             rpm,
@@ -158,7 +159,7 @@ class Session:
             and linear is self.linear
         ):
             return motion, self
-        after = Session(rpm, cycle_us, acc100, dec100, linear, self.full_step, defaults)
+        after = _make_session(rpm, cycle_us, acc100, dec100, linear, self.full_step, defaults)
         return motion, after
 
     def _velocity(self, rpm: int | Bare | None, cycle_us: int | None) -> tuple[int, int]:
@@ -181,22 +182,26 @@ class Session:
         """After ``A``; bare brings back the system default of the present ramp."""
         acc100 = acceleration.acc100
         if acc100 is BARE:
-            acc100 = self.defaults.acc_of(self.linear)
+            acc100 = self.defaults.acc_of(linear=self.linear)
         return replace(self, acc100=acc100)
 
     def with_deceleration(self, deceleration: Deceleration) -> Session:
         """After ``D``; bare brings back the system default of the present ramp."""
         dec100 = deceleration.dec100
         if dec100 is BARE:
-            dec100 = self.defaults.dec_of(self.linear)
+            dec100 = self.defaults.dec_of(linear=self.linear)
         return replace(self, dec100=dec100)
 
-    def with_ramp(self, linear: bool) -> Session:
+    def with_ramp(self, *, linear: bool) -> Session:
         """After ``$L``: the ramp, with its own default acceleration and deceleration."""
         defaults = self.defaults
-        acc100, dec100 = defaults.acc_of(linear), defaults.dec_of(linear)
+        acc100, dec100 = defaults.acc_of(linear=linear), defaults.dec_of(linear=linear)
         return replace(self, linear=linear, acc100=acc100, dec100=dec100)
 
-    def with_full_step(self, full_step: bool) -> Session:
+    def with_full_step(self, *, full_step: bool) -> Session:
         """After ``$F`` (True) or ``$P`` (False)."""
         return replace(self, full_step=full_step)
+
+
+_make_motion = maker(Motion)
+_make_session = maker(Session)
