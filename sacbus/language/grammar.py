@@ -88,11 +88,11 @@ def _one_byte_each(line: str) -> str:
 
 # --- the short cut -----------------------------------------------------------------------------
 
-_RAMP: Final = r"((?:[1-9][0-9]{2}|[0-9]{1,2}(?:\.[0-9]{0,2})?|\.[0-9]{1,2})?)"
+_RAMP: Final = r"((?:[1-9][0-9]{2}|[1-9][0-9]?(?:\.[0-9]{0,2})?|0?\.(?:[1-9][0-9]?|0[1-9]))?)"
 
 _GOOD: Final = re.compile(
     r"[mM](-?)([0-9]{0,9})"
-    r"(?:[vV]((?:[cC]?[0-9]{1,9})?)"
+    r"(?:[vV]((?:[cC]?[1-9][0-9]{0,8})?)"
     rf"|[aA]{_RAMP}"
     rf"|[dD]{_RAMP}"
     r"|[lL]([01])"
@@ -103,7 +103,12 @@ _GOOD: Final = re.compile(
     r")*(?: .*)?",
     re.DOTALL,
 )
-"""Motion lines that leave nothing to remark: a group repeated keeps its last match."""
+"""Motion lines that leave nothing to remark: no zero speed or ramp, even one that is overwritten.
+
+A group that repeats keeps its last match.
+
+Each bound is the largest that needs no look at the value; beyond it the readers decide.
+"""
 
 
 @lru_cache(maxsize=_CACHED_LINES)
@@ -116,27 +121,17 @@ def _parse(text: str) -> Parsed:
     cycle_us: int | None = None
     acc100: int | Bare | None = None
     dec100: int | Bare | None = None
-    # A zero speed or ramp is the readers' business: it calls for a remark.
     if speed is not None:
         if not speed:
             rpm = BARE
         elif speed[0] in "cC":
             cycle_us = int(speed[1:])
-            if not cycle_us:
-                return _read(text)
         else:
             rpm = int(speed)
-            if not rpm:
-                return _read(text)
     if acc is not None:
-        # At most five characters: the nearest integer of a hundredfold is exact.
-        acc100 = int(float(acc) * 100 + 0.5) if acc else BARE
-        if not acc100:
-            return _read(text)
+        acc100 = _hundredths(acc)
     if dec is not None:
-        dec100 = int(float(dec) * 100 + 0.5) if dec else BARE
-        if not dec100:
-            return _read(text)
+        dec100 = _hundredths(dec)
     return _make_parsed(
         _make_move(
             int(steps) if steps else None,
@@ -152,6 +147,15 @@ def _parse(text: str) -> Parsed:
             None if unit is None else unit in "pP",
         )
     )
+
+
+@lru_cache(maxsize=1024)
+def _hundredths(number: str) -> int | Bare:
+    """What ``_RAMP`` matched; five characters at most, so the nearest hundredth is exact.
+
+    Cached because a line takes two, and the same few are used over and over.
+    """
+    return int(float(number) * 100 + 0.5) if number else BARE
 
 
 _make_move = maker(Move)
