@@ -1,0 +1,32 @@
+"""The SAC: single-axis stepper controller, as a virtual node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from nodes.sac.node import SacNode
+from nodes.sac.protocol import SAC_PROTOCOL, SacProtocol
+from nodes.sac.settings import SacSettings
+from sacbus.kernel import LineRate
+from sacbus.node import Report
+
+__all__ = ["KIND", "SacKind", "SacNode", "SacProtocol", "SacSettings"]
+
+
+class SacKind:
+    """The entry point ``sac`` of the group ``sacbus.nodes``."""
+
+    name = "sac"
+    summary = "SAC single-axis stepper controller, network port"
+    protocol = SAC_PROTOCOL
+    settings = SacSettings
+
+    def create(
+        self, address: int, settings: SacSettings, rate: LineRate, tell: Callable[[Report], None]
+    ) -> SacNode:
+        """A node with factory memory at ``address``."""
+        return SacNode(address, settings, rate, tell)
+
+
+KIND: Final = SacKind()

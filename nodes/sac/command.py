@@ -1,0 +1,333 @@
+"""The command processor: the queue, what is pending, and which command runs now.
+
+Owns the session defaults, the 30 queue positions, the order of execution, sync, start wait, GAP and
+the stops. Turns commands into profiles (``sacbus.motion``) and gives them to the engine; what a
+line means is the message processor's business. Time is an argument, in ns.
+Source: manual, "Command buffer", "Motion", "Continuous", "GAP", "sync"; spec, commands and motion.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final, assert_never
+
+from nodes.sac.engine import TICK, Engine
+from sacbus.kernel import Ns
+from sacbus.language import (
+    Acceleration,
+    Deceleration,
+    Motion,
+    Move,
+    Next,
+    ReleaseSync,
+    Session,
+    ShowVelocity,
+    SinglePulses,
+    Stop,
+    Velocity,
+)
+from sacbus.motion import Drive, gap_passes, load_ticks, plan
+from sacbus.node import ReportKind
+
+__all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand"]
+
+#: Positions of the command queue (manual, "Throw-away").
+QUEUE_LENGTH: Final = 30
+
+#: The commands that end here; a message processor deals with the others itself.
+MotionCommand = (
+    Move
+    | Velocity
+    | ShowVelocity
+    | Acceleration
+    | Deceleration
+    | Stop
+    | Next
+    | ReleaseSync
+    | SinglePulses
+)
+
+
+class CommandProcessor:
+    """Executes commands on an engine.
+
+    ``soft_ops(start, at)``, when they are on, is told when a command starts (True) and ends, and
+    gives back when that has been sent and the node is free again; None when they are off. ``tell``
+    takes what is worth a report.
+    """
+
+    __slots__ = (
+        "_current",
+        "_drive",
+        "_engine",
+        "_free",
+        "_gap",
+        "_held",
+        "_kept_rpm",
+        "_last_acc",
+        "_last_end",
+        "_last_period",
+        "_pending",
+        "_position",
+        "_queue",
+        "_soft_ops",
+        "_stopping",
+        "_tell",
+        "_untold",
+        "session",
+    )
+
+    def __init__(
+        self,
+        session: Session,
+        drive: Drive,
+        engine: Engine,
+        soft_ops: Callable[[bool, Ns], Ns] | None,
+        tell: Callable[[ReportKind, str], None],
+    ) -> None:
+        self.session = session
+        self._drive = drive
+        self._engine = engine
+        self._soft_ops = soft_ops
+        #: The start that soft ops have yet to tell.
+        self._untold: Ns | None = None
+        self._tell = tell
+        #: Position 0 is the manual's hidden one for continuous motion; this list only keeps 1-30.
+        self._queue: list[Motion | None] = [None] * (QUEUE_LENGTH + 1)
+        self._position = 1
+        self._pending: deque[int] = deque()
+        self._current: Motion | None = None
+        self._held: Motion | None = None
+        #: When the node is free to load: now, or when its DC2 is out.
+        self._free: Ns = 0
+        self._gap = True
+        self._kept_rpm = 0
+        self._last_end: Ns = 0
+        self._last_period = 0
+        self._last_acc = (-1, -1, False)
+        self._stopping = False
+
+    @property
+    def current(self) -> Motion | None:
+        """The command that runs, or waits for its start; None when none does."""
+        return self._current
+
+    @property
+    def held(self) -> Motion | None:
+        """The command that is held at sync."""
+        return self._held
+
+    @property
+    def pending(self) -> list[Motion]:
+        """Commands that wait for their turn, in order."""
+        return [motion for at in self._pending if (motion := self._queue[at]) is not None]
+
+    def wake_at(self) -> Ns | None:
+        """When the command that runs is over, or its start is to be told."""
+        untold = self._untold
+        return self._engine.end if untold is None else untold
+
+    def wake(self, now: Ns) -> None:
+        """End the command that is over, and go on with the next."""
+        if self._untold is not None and self._untold <= now:
+            self._tell_start(self._untold)
+        end = self._engine.end
+        if end is not None and end <= now:
+            self._finish(end)
+            self._load_next(end)
+
+    def execute(self, command: MotionCommand, now: Ns) -> None:
+        """Do what a command says, at ``now``."""
+        match command:
+            case Move():
+                self._move(command, now)
+            case Velocity():
+                self.session = self.session.with_velocity(command)
+                self._retarget(now)
+            case Acceleration():
+                self.session = self.session.with_acceleration(command)
+            case Deceleration():
+                self.session = self.session.with_deceleration(command)
+            case Stop(grace):
+                self._stop(grace, now)
+            case Next(grace):
+                self._next(grace, now)
+            case ReleaseSync():
+                self._release(now)
+            case SinglePulses(signs):
+                self._single_pulses(signs)
+            case ShowVelocity():
+                # It prints on the terminal alone (spec, "Two ports"); the network hears nothing.
+                self._tell(ReportKind.IGNORED, "a query is answered on the terminal only")
+            case _:
+                assert_never(command)
+
+    def _move(self, move: Move, now: Ns) -> None:
+        motion, self.session = self.session.resolve(move)
+        if motion.steps is None:
+            self._preempt(motion, now)
+            return
+        if len(self._pending) == QUEUE_LENGTH:
+            self._tell(
+                ReportKind.OVERRUN,
+                f"31 commands pending: queue position {self._position} overwritten",
+            )
+        else:
+            self._pending.append(self._position)
+        self._queue[self._position] = motion
+        self._position = self._position % QUEUE_LENGTH + 1
+        self._load_next(now)
+
+    def _preempt(self, motion: Motion, now: Ns) -> None:
+        """Continuous motion begins at once; what ran is cut, its velocity kept."""
+        self._held = None
+        self._cut_off(now)
+        self._begin(motion, now)
+
+    def _load_next(self, now: Ns) -> None:
+        """Load the next pending command if nothing runs, waits or is held."""
+        if self._current is not None or self._held is not None or not self._pending:
+            return
+        motion = self._queue[self._pending.popleft()]
+        if motion is not None:
+            self._begin(motion, now)
+
+    def _begin(self, motion: Motion, now: Ns) -> None:
+        """Load a command; it starts unless it is held at sync."""
+        if motion.sync:
+            self._held = motion
+        else:
+            self._launch(motion, now)
+
+    def _launch(self, motion: Motion, now: Ns) -> None:
+        """Plan a loaded command and start it, after its start wait.
+
+        Seamless when it was there at the last one's end and is loaded within one more period: then
+        loading adds no time. Otherwise the first pulse comes a load time later, at slow again.
+        """
+        acc = (motion.acc100, motion.dec100, motion.linear)
+        load = load_ticks(acc != self._last_acc) * TICK
+        self._last_acc = acc
+        ready = max(now, self._free) + load + motion.wait_us * 1_000
+        kept = self._kept_rpm
+        start = ready
+        if kept and self._gap:
+            late = (ready - self._last_end) // TICK
+            if gap_passes(late, self._last_period):
+                start = ready if now > self._last_end or motion.wait_us else self._last_end
+            else:
+                kept = 0
+        profile = plan(motion, self._drive, kept)
+        self._current = motion
+        self._engine.start(profile, start)
+        for warning in profile.warnings:
+            self._tell(ReportKind.WARNING, str(warning))
+        if self._soft_ops is not None:
+            self._untold = start
+
+    def _finish(self, end: Ns) -> None:
+        """House-keeping in STOP: the present command ends at ``end``."""
+        profile = self._engine.profile
+        if profile is None:
+            return
+        self._kept_rpm = 0 if self._stopping else profile.kept_rpm
+        self._last_end = end
+        self._last_period = profile.last_period
+        self._stopping = False
+        self._current = None
+        self._engine.finish()
+        if self._soft_ops is not None:
+            if self._untold is not None:
+                self._tell_start(self._untold)
+            self._free = self._soft_ops(False, end)
+            # The packet outlasts the gap (manual, "ops/soft_ops").
+            self._kept_rpm = 0
+
+    def _cut_off(self, now: Ns) -> None:
+        """End whatever runs at once, keeping its velocity; one that has not begun is dropped."""
+        if self._engine.profile is None:
+            return
+        if now < self._engine.started:
+            self._drop_unstarted()
+            return
+        self._engine.change(lambda profile, at: profile.halt(at), now)
+        self._finish(now)
+
+    def _drop_unstarted(self) -> None:
+        """The command's first pulse has not come: it never will."""
+        self._engine.discard()
+        self._current = None
+        self._untold = None
+
+    def _tell_start(self, at: Ns) -> None:
+        self._untold = None
+        if self._soft_ops is not None:
+            self._soft_ops(True, at)
+
+    def _slow_down(self, dec100: int, linear: bool, now: Ns) -> None:
+        if now < self._engine.started:
+            self._drop_unstarted()
+            return
+        self._engine.change(lambda profile, at: profile.slow_down(at, dec100, linear), now)
+
+    def _stop(self, grace: bool, now: Ns) -> None:
+        """S and s: nothing that is pending now will run; it stays in the queue."""
+        self._pending.clear()
+        self._held = None
+        if self._engine.profile is None:
+            self._kept_rpm = 0
+        elif grace:
+            self._stopping = True
+            self._slow_down(self.session.dec100, self.session.linear, now)
+        else:
+            self._stopping = True
+            self._cut_off(now)
+        if self._engine.profile is None:
+            self._stopping = False
+            self._kept_rpm = 0
+
+    def _next(self, grace: bool, now: Ns) -> None:
+        """N and n: the present command ends, the next pending one follows."""
+        if self._held is not None:
+            self._held = None
+        elif self._current is not None and grace:
+            self._slow_down(self._current.dec100, self._current.linear, now)
+        else:
+            self._cut_off(now)
+        self._load_next(now)
+
+    def _release(self, now: Ns) -> None:
+        """y: the held command starts. Not remembered when nothing is held."""
+        held = self._held
+        if held is not None:
+            self._held = None
+            self._launch(held, now)
+
+    def _retarget(self, now: Ns) -> None:
+        """A new session velocity re-targets continuous motion, with the session's acceleration."""
+        current = self._current
+        if current is None or current.steps is not None or self._stopping:
+            return
+        session = self.session
+        target = replace(
+            current,
+            rpm=session.rpm,
+            cycle_us=session.cycle_us,
+            acc100=session.acc100,
+            linear=session.linear,
+        )
+        self._current = target
+        if now < self._engine.started:
+            started = self._engine.started
+            self._engine.discard()
+            self._engine.start(plan(target, self._drive, self._kept_rpm), started)
+        else:
+            self._engine.change(lambda profile, at: profile.retarget(at, target), now)
+
+    def _single_pulses(self, signs: str) -> None:
+        if self._engine.profile is not None:
+            self._tell(ReportKind.IGNORED, "single pulses only while the motor stands")
+            return
+        self._engine.step(signs.count("+") - signs.count("-"))

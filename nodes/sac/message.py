@@ -1,0 +1,72 @@
+"""The message processor: takes a line apart and sends each part where it belongs.
+
+Owns what a line from the network is: a command, a message for the terminal, something to be sent
+on, or nothing that a SAC knows. Motion goes to the command processor. SAC checks nothing and says
+nothing; what a line did not achieve is reported out of band.
+Source: manual, "Communications"; spec, "Two ports, two manners".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nodes.sac.command import CommandProcessor
+from sacbus.kernel import Ns
+from sacbus.language import Empty, Forward, Message, SoftOp, parse
+from sacbus.node import ReportKind
+from sacbus.wire import GENERAL_CALL
+
+__all__ = ["MessageProcessor"]
+
+
+class MessageProcessor:
+    """Lines in. ``send(dest, body, not_before)`` sends a line on; ``tell`` takes reports."""
+
+    __slots__ = ("_commands", "_last_source", "_line", "_send", "_tell")
+
+    def __init__(
+        self,
+        commands: CommandProcessor,
+        send: Callable[[int, bytes, Ns], Ns],
+        tell: Callable[[ReportKind, str, str, int], None],
+    ) -> None:
+        self._commands = commands
+        self._send = send
+        self._tell = tell
+        #: Who sent the last packet that was not a general call; ``/`` answers there.
+        self._last_source = GENERAL_CALL
+        self._line = b""
+
+    @property
+    def line(self) -> str:
+        """The line that is being executed, for reports made meanwhile."""
+        return self._line.decode("latin-1")
+
+    def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+        """The body of a packet that was accepted at ``now``."""
+        self._line = body
+        if destination != GENERAL_CALL:
+            self._last_source = source
+        parsed = parse(body)
+        command = parsed.command
+        for remark in parsed.remarks:
+            self._tell(
+                ReportKind.REFUSED if command is None else ReportKind.WARNING,
+                remark.text,
+                self.line,
+                remark.column,
+            )
+        match command:
+            case None | Empty() | SoftOp():
+                pass
+            case Forward(onward, rest):
+                self._send(
+                    self._last_source if onward is None else onward, rest.encode("latin-1"), now
+                )
+            case Message(text):
+                self._tell(
+                    ReportKind.MESSAGE, f"{source}:{destination}> {text.strip()}", self.line, 0
+                )
+            case _:
+                self._commands.execute(command, now)
+        self._line = b""

@@ -1,0 +1,134 @@
+"""A SAC: network port, message processor, command processor and motion engine put together.
+
+Owns the node as the bus sees it (the contract of ``sacbus.node``) and the wiring of its parts;
+each part's rules are in its own file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from nodes.sac.command import CommandProcessor
+from nodes.sac.engine import Engine
+from nodes.sac.memory import Memory
+from nodes.sac.message import MessageProcessor
+from nodes.sac.network import NetworkPort
+from nodes.sac.settings import SacSettings
+from sacbus.kernel import LineRate, Ns
+from sacbus.language import Motion, Session, describe_motion
+from sacbus.node import Heard, Report, ReportKind, Snapshot
+from sacbus.wire import DC1, DC2, GENERAL_CALL
+
+__all__ = ["SacNode"]
+
+
+class SacNode:
+    """One virtual SAC. Starts booted, with the factory's memory as its settings give it."""
+
+    kind = "sac"
+
+    def __init__(
+        self, address: int, settings: SacSettings, rate: LineRate, tell: Callable[[Report], None]
+    ) -> None:
+        self._settings = settings
+        self._rate = rate
+        self._tell_bus = tell
+        self._now: Ns = 0
+        self._boot(settings.factory_memory(address))
+
+    def _boot(self, memory: Memory) -> None:
+        """Start anew with this memory, as after a cold boot."""
+        self._memory = memory
+        self._engine = Engine()
+        self._commands = CommandProcessor(
+            Session.start(memory.defaults()),
+            memory.drive(),
+            self._engine,
+            self._tell_ops if memory.soft_ops else None,
+            self._tell,
+        )
+        self._network = NetworkPort(
+            memory.d_id, self._settings, self._rate, self._accept, self._tell
+        )
+        self._network.ack = bool(memory.ack)
+        self._network.crc = bool(memory.crc)
+        self._messages = MessageProcessor(self._commands, self._network.send, self._tell_line)
+
+    @property
+    def address(self) -> int:
+        """Its d_id."""
+        return self._network.address
+
+    @property
+    def receiving(self) -> bool:
+        """True while its receiver stands open."""
+        return self._network.receiving
+
+    def hear(self, heard: Heard, now: Ns) -> None:
+        """Bytes from the line."""
+        self._now = now
+        self._network.hear(heard)
+
+    def wake_at(self) -> Ns | None:
+        """The next answer or packet to send, or the end of the command that runs."""
+        sends = self._network.wake_at()
+        ends = self._commands.wake_at()
+        if sends is None:
+            return ends
+        return sends if ends is None or sends < ends else ends
+
+    def wake(self, now: Ns) -> bytes | None:
+        """End what is over; send what is due."""
+        self._now = now
+        self._commands.wake(now)
+        return self._network.wake(now)
+
+    def snapshot(self, now: Ns) -> Snapshot:
+        """State, position and counts at ``now``."""
+        commands, engine, network = self._commands, self._engine, self._network
+        pulses = engine.position(now)
+        held = commands.held
+        current = commands.current or held
+        pending = commands.pending
+        return Snapshot(
+            address=self.address,
+            kind=self.kind,
+            state="SYNC" if held is not None else engine.state(now).name,
+            position_steps=pulses / 2**self._memory.ustep,
+            position_pulses=pulses,
+            rpm=engine.rpm(now),
+            current="" if current is None else describe_motion(current),
+            pending=tuple(map(describe_motion, pending)),
+            counters={"packets": network.packets, "ack": network.acks, "nak": network.naks},
+        )
+
+    def persist(self) -> Mapping[str, int]:
+        """The EEPROM's contents."""
+        return self._memory.stored()
+
+    def restore(self, memory: Mapping[str, int]) -> None:
+        """Boot with a stored EEPROM; the stored d_id wins over the configured address."""
+        configured = self._memory.d_id
+        restored, remarks = self._memory.restored(memory)
+        for remark in remarks:
+            self._tell(ReportKind.WARNING, remark)
+        if restored.d_id != configured:
+            self._tell(
+                ReportKind.WARNING,
+                f"EEPROM: stored d_id {restored.d_id} wins over the configured address {configured}",
+            )
+        self._boot(restored)
+
+    def _accept(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+        self._messages.network_line(body, source, destination, now)
+
+    def _tell_ops(self, start: bool, at: Ns) -> Ns:
+        """Soft ops tell everybody that a command starts or ends; when that will be out."""
+        return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
+
+    def _tell(self, kind: ReportKind, text: str) -> None:
+        self._tell_line(kind, text, self._messages.line, 0)
+
+    def _tell_line(self, kind: ReportKind, text: str, line: str, column: int) -> None:
+        self._tell_bus(Report(self._now, self.address, kind, text, line, column))
+

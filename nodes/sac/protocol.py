@@ -1,0 +1,85 @@
+"""The SAC network as the bus must know it: who hears what, and what a packet says.
+
+Owns the routing rules that follow from the device's receiver: it acts on the byte after ETX, and a
+receiver that is idle stays idle until STX and its own address come by.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final
+
+from sacbus.kernel import LineRate
+from sacbus.language import describe, parse
+from sacbus.node import EVERYONE
+from sacbus.wire import GENERAL_CALL, STX, Answer, Fault, LineFault, Packet, PacketReceiver, Verdict
+
+__all__ = ["SAC_PROTOCOL", "SacProtocol"]
+
+#: The trigger: the first byte after ETX that is neither STX nor another ETX; and when the ETX came
+#: before the source, the first such byte after the source (spec, wire).
+_TRIGGER: Final = re.compile(
+    rb"\x02[^\x02\x03]\x03+[^\x02\x03]\x03*[^\x02\x03]|\x03+[^\x02\x03]"
+)
+#: STX may be repeated; the byte after the last one is the destination.
+_ADDRESSED: Final = re.compile(rb"\x02+([^\x02])")
+
+_FAULTS: Final = {
+    Fault.NOISE: "noise",
+    Fault.CUT_SHORT: "cut short",
+    Fault.BAD_CRC: "wrong CRC",
+    Fault.NO_NUL: "no NUL after the CRC",
+    Fault.TOO_LONG: "too long",
+}
+
+
+class SacProtocol:
+    """SAC packets on one pair of wires at 38 400 baud."""
+
+    name = "sac"
+    lanes = 1
+    rate = LineRate()
+
+    def cuts(self, data: bytes) -> Sequence[int]:
+        """The ends of all trigger bytes but one that ends the data itself."""
+        first = data.find(b"\x03")
+        if first < 0:
+            return ()
+        size = len(data)
+        # Nearly always: one packet, ETX CRC NUL.
+        if first == size - 3 and data[first + 1] > 3:
+            return (size - 1,)
+        return [end for hit in _TRIGGER.finditer(data) if (end := hit.end()) < size]
+
+    def addressed(self, data: bytes) -> Sequence[int] | None:
+        """Destinations named in the data; everyone for a general call.
+
+        An STX at the very end opens every receiver, since the destination is still to come.
+        """
+        if data[0] == STX and data.find(b"\x02", 1) < 0 and len(data) > 1:
+            return EVERYONE if data[1] == GENERAL_CALL else (data[1],)
+        if data[-1] == STX:
+            return EVERYONE
+        found = {hit[0] for hit in _ADDRESSED.findall(data)}
+        return EVERYONE if GENERAL_CALL in found else sorted(found)
+
+    def decoder(self) -> PacketReceiver:
+        """The robust receiver."""
+        return PacketReceiver()
+
+    def describe(self, event: object) -> str:
+        """A packet, an answer or a fault in words, without its time."""
+        match event:
+            case Packet(dest, src, body, verdict):
+                unchecked = "" if verdict is Verdict.RIGHT else " (no CRC)"
+                return f"{src} -> {dest or 'all'}: {describe(parse(body))}{unchecked}"
+            case Answer(dest, src, accepted):
+                return f"{src} -> {dest}: {'ACK' if accepted else 'NAK'}"
+            case LineFault(kind, data):
+                return f"{_FAULTS[kind]}: {data.hex(' ')}"
+            case _:
+                raise TypeError(f"not an event of the SAC decoder: {event!r}")
+
+
+SAC_PROTOCOL: Final = SacProtocol()

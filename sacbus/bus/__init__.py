@@ -1,0 +1,8 @@
+"""The line itself: transmissions, collisions, nodes and ports. Synchronous, in kernel time."""
+
+from sacbus.bus.bus import Bus
+from sacbus.bus.medium import LaneCounters, Listener, Medium
+from sacbus.bus.port import LATENCY, Port
+from sacbus.bus.transmission import Transmission
+
+__all__ = ["LATENCY", "Bus", "LaneCounters", "Listener", "Medium", "Port", "Transmission"]

@@ -1,0 +1,190 @@
+"""A bus: a medium with nodes on it, their appointments and what they report.
+
+Owns which node sits at which address, when each wants to be woken, and the routing of bytes to
+nodes by the protocol's rules. Nodes are met only through the contract in ``sacbus.node``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+from sacbus.bus.medium import Medium
+from sacbus.kernel import Kernel, LineRate, Ns
+from sacbus.node import Heard, Node, Protocol, Report
+
+__all__ = ["Bus"]
+
+#: Reports kept for whoever asks later; older ones are only counted.
+REPORTS_KEPT: Final = 1_000
+
+
+class _Seat:
+    """A node's place on the bus and its next appointment with the kernel."""
+
+    __slots__ = ("due", "node", "order")
+
+    def __init__(self, node: Node, order: int) -> None:
+        self.node = node
+        self.order = order
+        self.due: Ns | None = None
+
+
+class Bus:
+    """A line with nodes. Several buses may share a kernel; they share nothing else.
+
+    ``lanes`` overrides the protocol's own (1 or 2). ``seed`` fixes everything left to chance.
+    Add nodes, open ports (``sacbus.bus.port``), then run the kernel.
+    """
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        protocol: Protocol,
+        *,
+        name: str = "bus",
+        rate: LineRate | None = None,
+        lanes: int | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.kernel = kernel
+        self.protocol = protocol
+        self.name = name
+        self._routes = _Routes(kernel, protocol)
+        self.medium = Medium(
+            kernel,
+            rate or protocol.rate,
+            self._routes,
+            lanes=lanes or protocol.lanes,
+            seed=seed,
+        )
+        self._routes.transmit = self._transmit
+        #: Everything reported out of band, newest last, bounded; and counts by kind, unbounded.
+        self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
+        self.report_counts: Counter[str] = Counter()
+        #: Called with each report as it is made.
+        self.report_watchers: list[Callable[[Report], None]] = []
+
+    @property
+    def rate(self) -> LineRate:
+        """The rate of the line."""
+        return self.medium.rate
+
+    def tell(self, report: Report) -> None:
+        """Take a report from a node; this is what a kind's ``create`` is given."""
+        self.reports.append(report)
+        self.report_counts[report.kind.value] += 1
+        for watcher in self.report_watchers:
+            watcher(report)
+
+    def add(self, node: Node) -> None:
+        """Put a node on the line. Two nodes of one address both hear and both answer, as on wires."""
+        self._routes.add(node)
+
+    @property
+    def nodes(self) -> Iterator[Node]:
+        """The nodes in the order in which they were added."""
+        return (seat.node for seat in self._routes.seats)
+
+    def node(self, address: int) -> Node:
+        """The first node with that address; KeyError names it."""
+        for node in self.nodes:
+            if node.address == address:
+                return node
+        raise KeyError(f"no node {address} on {self.name}")
+
+    def touch(self, node: Node) -> None:
+        """Ask a node anew when it wants to be woken, after it was driven from outside the bus."""
+        self._routes.touch(node)
+
+    def _transmit(self, node: Node, data: bytes) -> None:
+        self.medium.transmit(node, data, self.medium.node_lane)
+
+
+class _Routes:
+    """Who hears what among the nodes, and when each of them wants to be woken."""
+
+    def __init__(self, kernel: Kernel, protocol: Protocol) -> None:
+        self._kernel = kernel
+        self._addressed = protocol.addressed
+        self.cuts = protocol.cuts
+        self.seats: list[_Seat] = []
+        self._by_address: dict[int, list[_Seat]] = {}
+        #: Seats whose receiver stands open. A dict for its order: the same in every run.
+        self._open: dict[_Seat, None] = {}
+        self.transmit: Callable[[Node, bytes], None]
+
+    @property
+    def standing_open(self) -> bool:
+        return bool(self._open)
+
+    def add(self, node: Node) -> None:
+        seat = _Seat(node, len(self.seats))
+        self.seats.append(seat)
+        self._by_address.setdefault(node.address, []).append(seat)
+        self._appoint(seat)
+
+    def touch(self, node: Node) -> None:
+        for seat in self.seats:
+            if seat.node is node:
+                self._appoint(seat)
+
+    def deliver(self, heard: Heard, sender: object, now: Ns) -> None:
+        addresses = self._addressed(heard.data)
+        if addresses is None:
+            chosen = self.seats
+        elif not self._open:
+            if not addresses:
+                return
+            chosen = self._by_address.get(addresses[0], [])
+            if len(addresses) > 1:
+                chosen = self._several(addresses, {})
+        else:
+            chosen = self._several(addresses, self._open)
+        for seat in chosen:
+            node = seat.node
+            if node is sender:
+                continue
+            node.hear(heard, now)
+            if node.receiving:
+                self._open[seat] = None
+            elif self._open:
+                self._open.pop(seat, None)
+            self._appoint(seat)
+
+    def _several(self, addresses: Sequence[int], others: dict[_Seat, None]) -> list[_Seat]:
+        chosen = dict(others)
+        for address in addresses:
+            for seat in self._by_address.get(address, ()):
+                chosen[seat] = None
+        return sorted(chosen, key=lambda seat: seat.order)
+
+    def _appoint(self, seat: _Seat) -> None:
+        """Make the node's next appointment, unless one as early stands already.
+
+        A later one that stands is not cancelled: when it comes, :meth:`_wake` finds that it is not
+        the one that counts.
+        """
+        when = seat.node.wake_at()
+        if when is not None and (seat.due is None or when < seat.due):
+            if when < self._kernel.now:
+                when = self._kernel.now
+            seat.due = when
+            self._kernel.at(when, self._wake, seat, when)
+
+    def _wake(self, seat: _Seat, when: Ns) -> None:
+        if seat.due != when:
+            return
+        seat.due = None
+        node = seat.node
+        wanted = node.wake_at()
+        if wanted is not None and wanted <= when:
+            data = node.wake(when)
+            if data:
+                self.transmit(node, data)
+            if node.receiving:
+                self._open[seat] = None
+            elif self._open:
+                self._open.pop(seat, None)
+        self._appoint(seat)

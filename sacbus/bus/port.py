@@ -1,0 +1,111 @@
+"""A port: the place where outside bytes get on the line, and its bytes get out.
+
+Owns the pacing of a link's bytes: a program writes whenever it likes, the line takes 260 µs a byte
+and one talker at a time. A port also is how mother sits on a virtual bus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from sacbus.bus.medium import Medium
+from sacbus.kernel import MS, Ns
+from sacbus.node import Heard
+
+__all__ = ["LATENCY", "Port"]
+
+#: A paced link starts to send no earlier than this after the line went idle, as a USB adapter's
+#: round trip makes it; so a quick client does not fall into a node's deaf time.
+LATENCY: Final[Ns] = 1 * MS
+
+#: What a port sends in one transmission at most; a run of several goes out without a pause. It
+#: bounds how long a listener waits for the first byte of a stream that holds no frame.
+CHUNK: Final = 4_096
+
+
+class Port:
+    """A talker and listener on the line.
+
+    Bytes given to :meth:`talk` take line time from their arrival on, and start no earlier than
+    ``latency`` after the line went idle; while the port itself is sending they follow without a
+    pause. ``hear`` takes what arrives on the line; with ``echo`` the port's own bytes too, as a
+    two-wire adapter gives them back (so only on a line of one lane).
+    """
+
+    __slots__ = ("_buffer", "_hear", "_latency", "_medium", "_until", "_waiting", "echo")
+
+    def __init__(
+        self,
+        medium: Medium,
+        hear: Callable[[Heard, Ns], None],
+        *,
+        latency: Ns = LATENCY,
+        echo: bool = False,
+    ) -> None:
+        self._medium = medium
+        self._hear = hear
+        self._latency = latency
+        self._buffer = bytearray()
+        #: True while an appointment to start or to go on sending stands.
+        self._waiting = False
+        #: When the port's own last transmission ends.
+        self._until: Ns = -1
+        self.echo = echo
+        medium.listen(medium.node_lane, self, None if echo else self)
+
+    @property
+    def unsent(self) -> int:
+        """Bytes that wait for the line."""
+        return len(self._buffer)
+
+    def hear(self, heard: Heard, now: Ns) -> None:
+        """The medium's side: pass on what arrived."""
+        self._hear(heard, now)
+
+    def talk(self, data: bytes) -> None:
+        """Bytes from outside, arriving now."""
+        self._buffer += data
+        if self._waiting or not self._buffer:
+            return
+        kernel = self._medium.kernel
+        if kernel.now < self._until:
+            # What comes in while the port is sending follows without a pause.
+            self._waiting = True
+            kernel.at(self._until, self._start)
+        else:
+            self._start()
+
+    def drop(self) -> int:
+        """Forget what has not been sent; how many bytes that was."""
+        dropped = len(self._buffer)
+        self._buffer.clear()
+        return dropped
+
+    def close(self) -> None:
+        """Leave the line. What is being sent is sent to its end; the rest is dropped."""
+        self._buffer.clear()
+        for lane in range(self._medium.lanes):
+            self._medium.unlisten(lane, self)
+
+    def _start(self) -> None:
+        """Send what is buffered if the line lets us, or make an appointment for when it may."""
+        self._waiting = False
+        if not self._buffer:
+            return
+        medium = self._medium
+        kernel = medium.kernel
+        now = kernel.now
+        if now != self._until:
+            free_at = medium.free_at(medium.master_lane)
+            earliest = now if free_at is None else max(now, free_at + self._latency)
+            if earliest > now:
+                self._waiting = True
+                kernel.at(earliest, self._start)
+                return
+        chunk = bytes(self._buffer[:CHUNK])
+        del self._buffer[:CHUNK]
+        self._until = medium.transmit(self, chunk, medium.master_lane).end
+        if self._buffer:
+            self._waiting = True
+            kernel.at(self._until, self._start)

@@ -1,0 +1,274 @@
+"""The command line: parses, calls the same public API as everyone, prints.
+
+Owns arguments, messages and exit statuses; no rule and no state of a bus. Errors are one line,
+``error: WHAT, WHERE, WHAT TO DO``, on standard error; ``-v`` adds the traceback.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sys
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+import click
+
+from sacbus import __version__
+
+__all__ = ["main"]
+
+#: Exit statuses of ``send`` (spec, cli).
+NAK_STATUS: Final = 3
+NO_ANSWER_STATUS: Final = 4
+UNKNOWN_STATUS: Final = 5
+INTERRUPTED: Final = 130
+
+LINK_HELP: Final = "LINK is the path of a serial port or of a bus's pty, such as /tmp/sacbus."
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="sacbus", message="%(prog)s %(version)s")
+@click.option("-v", "--verbose", is_flag=True, help="Show the traceback of an error.")
+def root(verbose: bool) -> None:
+    """A software RS485 bus of virtual SAC motion controllers.
+
+    \b
+    Example: sacbus serve --nodes 10-19 --pty /tmp/sacbus
+             sacbus send /tmp/sacbus 10m400
+    """
+
+
+class NodeRange(click.ParamType):
+    """``10-19,85``: addresses and ranges of them, ascending or not, each once."""
+
+    name = "addresses"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, ...]:
+        """The addresses in the order given."""
+        if isinstance(value, tuple):
+            return value
+        found: list[int] = []
+        for part in str(value).split(","):
+            first, dash, last = part.strip().partition("-")
+            if not first.isdecimal() or (dash and not last.isdecimal()):
+                self.fail(f"expected addresses like 10-19,85, got {part!r} in {value!r}")
+            low, high = int(first), int(last or first)
+            if not 4 <= low <= high <= 255:
+                self.fail(f"expected addresses from 4 to 255, low to high, got {part!r}")
+            found.extend(range(low, high + 1))
+        if len(set(found)) != len(found):
+            twice = next(address for address in found if found.count(address) > 1)
+            self.fail(f"address {twice} is given twice in {value!r}")
+        return tuple(found)
+
+
+def _setting(_ctx: click.Context, _param: click.Parameter, given: Sequence[str]) -> dict[str, object]:
+    """``--set NAME=VALUE``: whole numbers, true/false, or a word."""
+    settings: dict[str, object] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise click.BadParameter(f"expected NAME=VALUE, got {text!r}")
+        if value.lower() in ("true", "false"):
+            settings[name] = value.lower() == "true"
+        else:
+            settings[name] = int(value) if value.isdecimal() else value
+    return settings
+
+
+@root.command()
+@click.option("--nodes", type=NodeRange(), default="10-12", show_default=True, metavar="10-19,85",
+              help="Addresses of the virtual nodes.")
+@click.option("--kind", default="sac", show_default=True, help="Their kind (see sacbus kinds).")
+@click.option("--set", "settings", multiple=True, callback=_setting, metavar="NAME=VALUE",
+              help="A setting of the kind, such as soft_ops=true. May be repeated.")
+@click.option("--receiver", type=click.Choice(["device", "robust"]), default=None,
+              help="How nodes read packets: as the firmware does, or as specified.")
+@click.option("--pty", type=click.Path(path_type=Path), metavar="PATH",
+              help="Make PATH a stable symlink to the bus's pty.")
+@click.option("--baud", type=click.IntRange(300, 4_000_000), default=38_400, show_default=True,
+              help="Line rate.")
+@click.option("--state", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+              help="Where the nodes' EEPROM is kept. Default: the user's state directory.")
+@click.option("--ephemeral", is_flag=True, help="Keep the EEPROM in memory only.")
+@click.option("--no-pace", is_flag=True, help="Let the line run ahead of the clock.")
+@click.option("--speed", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True,
+              help="Bus seconds in a second.")
+@click.option("--seed", type=int, default=0, show_default=True, help="For what is left to chance.")
+@click.option("--echo", is_flag=True, help="Give a client its own bytes back, as 2-wire adapters do.")
+@click.option("--no-table", is_flag=True, help="No live table on a terminal.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of text.")
+def serve(pty: Path | None, state: Path | None, ephemeral: bool, no_pace: bool, no_table: bool,
+          as_json: bool, receiver: str | None, settings: dict[str, object], **given: Any) -> int:
+    """Host a bus and print where to connect. Ctrl-C ends it.
+
+    \b
+    Example: sacbus serve --nodes 10-19,85 --pty /tmp/sacbus
+    """
+    from sacbus.daemon import Configuration
+    from sacbus.serve import serve as run
+    from sacbus.state import default_directory
+
+    if ephemeral and state is not None:
+        raise click.UsageError("--state and --ephemeral contradict each other, leave one out")
+    if receiver is not None:
+        settings = {**settings, "receiver": receiver}
+    configuration = Configuration(
+        settings=settings,
+        pty=pty or True,
+        state=None if ephemeral else state or default_directory(),
+        pace=not no_pace,
+        **given,
+    )
+    return asyncio.run(run(configuration, as_json=as_json, show_table=not no_table))
+
+
+@root.command()
+@click.argument("link")
+@click.argument("line")
+@click.option("--baud", type=click.IntRange(300, 4_000_000), default=38_400, show_default=True,
+              help="Line rate.")
+@click.option("--accept-duplicates", is_flag=True,
+              help="After silence send again even what may then run twice.")
+@click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
+def send(link: str, line: str, baud: int, accept_duplicates: bool, as_json: bool) -> int:
+    """Send LINE as mother and wait for the ACK. LINE begins with an address: 85m3000a2d1.
+
+    LINK is the path of a serial port or of a bus's pty. Address 0 is everybody; nobody answers it.
+    Status: 0 ACK, 3 NAK, 4 no answer, 5 unknown outcome (silence after a command that must not run
+    twice).
+
+    \b
+    Example: sacbus send /tmp/sacbus 10m400v120
+             sacbus send /tmp/sacbus 0S
+    """
+    from sacbus.mother import NoAnswer, Refused, UnknownOutcome, addressed_line
+
+    node, command = addressed_line(line)
+    statuses = {Refused: ("nak", NAK_STATUS), NoAnswer: ("no answer", NO_ANSWER_STATUS),
+                UnknownOutcome: ("unknown", UNKNOWN_STATUS)}
+    report: dict[str, object] = {"node": node, "line": command}
+    try:
+        report |= asyncio.run(_send(link, node, command, baud, accept_duplicates))
+    except (Refused, NoAnswer, UnknownOutcome) as failure:
+        outcome, status = statuses[type(failure)]
+        if as_json:
+            report |= {"outcome": outcome, "attempts": failure.attempts, "round_trip_us": None}
+            click.echo(json.dumps(report))
+        click.echo(f"error: {failure}", err=True)
+        return status
+    if as_json:
+        click.echo(json.dumps(report))
+    elif report["outcome"] == "ack":
+        attempts = report["attempts"]
+        again = f" after {attempts} attempts" if attempts != 1 else ""
+        click.echo(f"ACK from node {node}{again}, {report['round_trip_us']} us")
+    else:
+        click.echo("sent to all nodes; nobody answers a broadcast")
+    return 0
+
+
+async def _send(
+    link: str, node: int, command: str, baud: int, accept_duplicates: bool
+) -> dict[str, object]:
+    from sacbus.mother import Mother
+
+    async with Mother.connect(link, baud=baud) as mother:
+        if node == 0:
+            await mother.broadcast(command)
+            return {"outcome": "broadcast", "attempts": 1, "round_trip_us": None}
+        answer = await mother.send(node, command, accept_duplicates=accept_duplicates)
+    return {
+        "outcome": "ack",
+        "attempts": answer.attempts,
+        "round_trip_us": answer.round_trip // 1_000,
+    }
+
+
+@root.command()
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+def kinds(as_json: bool) -> int:
+    """List the kinds of node that are installed, and their settings.
+
+    \b
+    Example: sacbus kinds
+    """
+    from sacbus.node import kinds as installed
+    from sacbus.node import setting_list
+
+    found = installed()
+    if as_json:
+        click.echo(json.dumps({
+            "kinds": [
+                {
+                    "kind": name,
+                    "summary": kind.summary,
+                    "protocol": kind.protocol.name,
+                    "settings": [
+                        {"name": one.name, "default": one.default, "allowed": one.allowed,
+                         "help": one.help}
+                        for one in setting_list(kind.settings)
+                    ],
+                }
+                for name, kind in found.items()
+            ]
+        }))
+        return 0
+    for name, kind in found.items():
+        click.echo(f"{name}: {kind.summary}")
+        for one in setting_list(kind.settings):
+            default = str(one.default).lower() if isinstance(one.default, bool) else one.default
+            click.echo(f"  {one.name} = {default}  ({one.allowed})")
+            click.echo(f"      {one.help}")
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """The entry point ``sacbus``: runs a command and exits with its status."""
+    sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+def run(arguments: list[str]) -> int:
+    """Run a command; its exit status. Errors that users can do something about are one line."""
+    from sacbus.links import LinkError
+    from sacbus.mother import MotherError
+    from sacbus.node import KindError, SettingError
+    from sacbus.state import StateError
+
+    verbose = bool({"-v", "--verbose"} & set(arguments))
+    try:
+        status = root.main(arguments, prog_name="sacbus", standalone_mode=False)
+    except click.ClickException as fault:
+        return _failed(_usage(fault), fault.exit_code, verbose)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our output has left (head, less); nobody is left to tell.
+        sys.stderr.close()
+        return 1
+    except (LinkError, MotherError, KindError, SettingError, StateError) as fault:
+        text = fault.args[0] if isinstance(fault, KindError) else str(fault)
+        return _failed(text, 1, verbose)
+    return status if isinstance(status, int) else 0
+
+
+def _usage(fault: click.ClickException) -> str:
+    """Click's message on one line, with what to do at its end."""
+    text = " ".join(fault.format_message().split()).rstrip(".")
+    context = getattr(fault, "ctx", None)
+    if isinstance(fault, click.UsageError) and context is not None:
+        return f"{text}, see {context.command_path} --help"
+    return text
+
+
+def _failed(text: str, status: int, verbose: bool) -> int:
+    if verbose:
+        traceback.print_exc()
+    click.echo(f"error: {text}", err=True)
+    return status

@@ -1,0 +1,161 @@
+"""The daemon: builds a bus with its nodes and links from one configuration, and takes it down.
+
+Owns the order of starting and stopping. Nothing is opened before everything has been checked, and
+what was opened is closed again in every case: a port is released, memory is saved.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping
+from contextlib import ExitStack, asynccontextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+from sacbus.bus import Bus, Port
+from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
+from sacbus.kernel import Kernel, LineRate
+from sacbus.links import Link, PtyLink
+from sacbus.mother import Mother
+from sacbus.node import Heard, NodeKind, Report, ReportKind, Snapshot, find_kind, settings_from
+from sacbus.state import StateDirectory
+
+__all__ = ["Configuration", "HostedBus", "open_bus"]
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """One bus: its nodes, its line, its links.
+
+    ``pty``: True for a pty, or the path of a symlink to one. ``state``: the directory for the
+    nodes' EEPROM, None keeps it in memory. ``speed`` scales bus time; ``pace`` False lets the line
+    run ahead of the clock. ``lanes`` overrides the protocol's. ``settings`` are the kind's own.
+    """
+
+    nodes: tuple[int, ...] = (10, 11, 12)
+    kind: str = "sac"
+    settings: Mapping[str, object] = field(default_factory=dict)
+    name: str = "bus"
+    baud: int = 38_400
+    lanes: int | None = None
+    seed: int = 0
+    pty: bool | Path = False
+    echo: bool = False
+    state: Path | None = None
+    speed: float = 1.0
+    pace: bool = True
+
+
+class HostedBus:
+    """A bus that runs: its nodes can be looked at, driven by mother, and connected to."""
+
+    def __init__(self, configuration: Configuration, kind: NodeKind, bus: Bus, host: Host) -> None:
+        self.configuration = configuration
+        self.kind = kind
+        self.bus = bus
+        self.host = host
+        self.links: list[Link] = []
+        #: Nodes by the address they were configured with, which names their memory.
+        self._configured = dict(zip(configuration.nodes, bus.nodes, strict=True))
+
+    def snapshots(self) -> list[Snapshot]:
+        """All nodes as they are now."""
+        self.host.arrive(lambda: None)
+        now = self.host.kernel.now
+        return [node.snapshot(now) for node in self.bus.nodes]
+
+    def snapshot(self, address: int) -> Snapshot:
+        """One node as it is now; KeyError when there is none."""
+        self.host.arrive(lambda: None)
+        return self.bus.node(address).snapshot(self.host.kernel.now)
+
+    def attach(self, link: Link) -> Port:
+        """Put an open link's bytes on the line, and the line's on the link."""
+
+        def hear(heard: Heard, _now: int) -> None:
+            link.send(heard.data)
+
+        port = Port(self.bus.medium, hear, echo=self.configuration.echo)
+        link.open(partial(self.host.arrive, port.talk))
+        self.links.append(link)
+        return port
+
+    def mother(self) -> Mother:
+        """Mother on this very bus, at no distance from the line."""
+
+        def hear(heard: Heard, _now: int) -> None:
+            mother.hear(heard.data)
+
+        port = Port(self.bus.medium, hear, latency=0)
+        mother = Mother(
+            self.host.kernel, port.talk, rate=self.bus.rate, arrive=self.host.arrive
+        )
+        return mother
+
+    def save(self, state: StateDirectory) -> None:
+        """Write every node's memory."""
+        for address, node in self._configured.items():
+            state.save(address, self.kind.name, node.persist())
+
+
+@asynccontextmanager
+async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[HostedBus]:
+    """Host a bus in the running loop, for an ``async with`` block.
+
+    In a :class:`~sacbus.host.VirtualLoop` bus time is that loop's time; in any other it follows the
+    loop's clock, as precisely as that loop wakes. Raises KindError, SettingError, StateError or
+    LinkError, each a line that a user can act on, with nothing left open.
+    """
+    configuration = configuration or Configuration()
+    kind = find_kind(configuration.kind)
+    settings = settings_from(kind.settings, configuration.settings)
+    loop = asyncio.get_running_loop()
+    virtual = isinstance(loop, VirtualLoop)
+    kernel = loop.kernel if isinstance(loop, VirtualLoop) else Kernel()
+    rate = LineRate(configuration.baud, kind.protocol.rate.bits)
+    bus = Bus(
+        kernel,
+        kind.protocol,
+        name=configuration.name,
+        rate=rate,
+        lanes=configuration.lanes,
+        seed=configuration.seed,
+    )
+    state = None
+    if configuration.state is not None:
+        state = StateDirectory(configuration.state, configuration.name)
+        state.check()
+    for address in configuration.nodes:
+        node = kind.create(address, settings, rate, bus.tell)
+        if state is not None:
+            memory, remark = state.load(address, kind.name)
+            if remark is not None:
+                bus.tell(Report(kernel.now, address, ReportKind.WARNING, remark))
+            if memory is not None:
+                node.restore(memory)
+        bus.add(node)
+    with ExitStack() as stack:
+        host: Host
+        if virtual:
+            host = VirtualHost(kernel)
+        else:
+            lane = bus.medium.master_lane
+            host = RealHost(
+                kernel,
+                loop,
+                speed=configuration.speed,
+                line_free_at=None
+                if configuration.pace
+                else lambda: bus.medium.free_at(lane),
+            )
+        stack.callback(host.close)
+        hosted = HostedBus(configuration, kind, bus, host)
+        if state is not None:
+            stack.callback(hosted.save, state)
+        if configuration.pty:
+            path = configuration.pty if isinstance(configuration.pty, Path) else None
+            link = PtyLink(path, baud=configuration.baud)
+            stack.callback(link.close)
+            hosted.attach(link)
+        yield hosted

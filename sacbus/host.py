@@ -1,0 +1,199 @@
+"""Hosts of the kernel: who moves its clock. Real time, scaled time, virtual time.
+
+Owns the relation between bus time and an asyncio loop. Everything that waits for the world (links,
+mother's coroutines, signals) runs on the loop; everything on the bus runs in the kernel, when the
+host says so.
+
+- *Real* (:class:`RealHost`): bus time follows the loop's clock, times ``speed``, against one
+  absolute anchor, so that a late wake-up delays one event and never shifts those that follow. It is
+  as precise as the loop it runs on. With ``ahead`` the line does not wait for the clock.
+- *Virtual* (:class:`VirtualLoop`): an event loop whose clock *is* the kernel's. When nothing else is
+  ready it jumps to the next event or timer. The same run, every time, as fast as it computes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+from collections.abc import Callable, Coroutine
+from typing import Any, Final, TypeVar
+from typing import Protocol as Contract
+
+from sacbus.kernel import MS, SECOND, Kernel, Ns
+
+__all__ = ["Host", "RealHost", "Standstill", "VirtualHost", "VirtualLoop", "run_virtual"]
+
+_T = TypeVar("_T")
+
+#: Without pace, bus time runs ahead until the line has been quiet for this long: longer than any
+#: turnaround (0.92 ms) and link latency (1 ms), so that answers come before the clock is waited for.
+_QUIET: Final[Ns] = 2 * MS
+
+
+class Host(Contract):
+    """What links and the daemon need of a host."""
+
+    kernel: Kernel
+
+    def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
+        """Something came in from the world: bring bus time up to date, then take it in."""
+        ...
+
+    def close(self) -> None:
+        """Stop moving the clock; idempotent."""
+        ...
+
+
+class RealHost:
+    """Bus time follows ``loop``'s clock. Constructed within a running loop or given one.
+
+    ``speed`` scales: 10 lets ten bus seconds pass in one. ``line_free_at``, when given, says when
+    the line was last, or will be, free: then bus time runs ahead of the clock while the line is in
+    use (``serve --no-pace``); motion keeps the clock's time.
+    """
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        loop: asyncio.AbstractEventLoop,
+        *,
+        speed: float = 1.0,
+        line_free_at: Callable[[], Ns | None] | None = None,
+    ) -> None:
+        if not speed > 0:
+            raise ValueError(f"speed: expected more than 0, got {speed}")
+        self.kernel = kernel
+        self._loop = loop
+        self._speed = speed
+        self._line_free_at = line_free_at
+        self._wall_anchor = loop.time()
+        self._bus_anchor = kernel.now
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_for: Ns | None = None
+        self._closed = False
+        self._arm()
+
+    def bus_now(self) -> Ns:
+        """The bus time that the clock shows now."""
+        elapsed = (self._loop.time() - self._wall_anchor) * self._speed
+        return self._bus_anchor + int(elapsed * SECOND)
+
+    def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
+        """Bring bus time up to date, call back, and see to what follows from it."""
+        if self._closed:
+            return
+        self.kernel.run_until(self.bus_now())
+        callback(*arguments)
+        self._go_on()
+
+    def close(self) -> None:
+        """Stop; no event runs any more."""
+        self._closed = True
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _due(self) -> None:
+        self._timer = None
+        self.kernel.run_until(self.bus_now())
+        self._go_on()
+
+    def _go_on(self) -> None:
+        if self._line_free_at is not None:
+            self._run_ahead(self._line_free_at)
+        self._arm()
+
+    def _run_ahead(self, line_free_at: Callable[[], Ns | None]) -> None:
+        """Run the line's events without waiting, and move the anchor by what that gained."""
+        kernel = self.kernel
+        while (free_at := line_free_at()) is not None:
+            when = kernel.next_at()
+            if when is None or when > free_at + _QUIET:
+                break
+            kernel.run_until(when)
+        gained = kernel.now - self.bus_now()
+        if gained > 0:
+            self._bus_anchor += gained
+
+    def _arm(self) -> None:
+        """Have the loop call when the next event is due."""
+        when = self.kernel.next_at()
+        if self._timer is not None:
+            if self._timer_for is not None and when is not None and self._timer_for <= when:
+                return  # it fires early enough, finds nothing due, and arms again
+            self._timer.cancel()
+            self._timer = None
+        if when is None or self._closed:
+            return
+        self._timer_for = when
+        wait = (when - self._bus_anchor) / SECOND / self._speed
+        self._timer = self._loop.call_at(self._wall_anchor + wait, self._due)
+
+
+class Standstill(RuntimeError):
+    """Virtual time cannot go on: coroutines wait, and nothing on the bus or the loop is due."""
+
+
+class _VirtualSelector(selectors.DefaultSelector):  # type: ignore[misc, valid-type]
+    # The base is chosen by typeshed per platform; that is the error ignored above.
+    """Instead of waiting, moves the kernel. Descriptors are looked at, never waited for."""
+
+    kernel: Kernel
+
+    def select(self, timeout: float | None = None) -> list[Any]:
+        ready = super().select(0)
+        if ready or (timeout is not None and timeout <= 0):
+            return ready
+        kernel = self.kernel
+        when = kernel.next_at()
+        if timeout is not None:
+            # Rounded up: a timer must not find itself a nanosecond short of its time.
+            limit = kernel.now + int(timeout * SECOND) + 1
+            if when is None or when > limit:
+                kernel.run_until(limit)
+                return []
+        elif when is None:
+            # Only asyncio's own wake-up pipe is registered: no thread or descriptor can help.
+            if len(self.get_map()) <= 1:
+                raise Standstill(
+                    "virtual time stands still: coroutines wait for something that no event on the "
+                    "bus, no timer and no descriptor will ever bring"
+                )
+            return super().select(None)
+        kernel.run_next()
+        return []
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """An asyncio loop in virtual time: ``loop.time()`` is the kernel's clock, in seconds."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        selector = _VirtualSelector()
+        selector.kernel = kernel
+        self.kernel = kernel
+        super().__init__(selector)
+        self._clock_resolution = 1 / SECOND
+
+    def time(self) -> float:
+        """Bus time in seconds."""
+        return self.kernel.now / SECOND
+
+
+class VirtualHost:
+    """The host of a bus inside a :class:`VirtualLoop`, whose selector moves the clock."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self.kernel = kernel
+
+    def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
+        """Bus time is up to date already."""
+        callback(*arguments)
+
+    def close(self) -> None:
+        """Nothing to stop: without the loop, no time passes."""
+
+
+def run_virtual(kernel: Kernel, main: Coroutine[Any, Any, _T]) -> _T:
+    """``asyncio.run`` in the virtual time of ``kernel``; gives what ``main`` returns."""
+    with asyncio.Runner(loop_factory=lambda: VirtualLoop(kernel)) as runner:
+        return runner.run(main)

@@ -1,0 +1,134 @@
+"""The event queue and the only clock of the core, and the units of time.
+
+Owns *when* things happen on the bus: one heap of (time, order, callback) in integer nanoseconds of
+bus time; and what a byte takes on a line. Knows neither asyncio nor the wall clock; ``host.py`` runs it in real, scaled or virtual
+time. Everything below (medium, nodes, mother's transactions) is plain synchronous code that is
+called from here and asks for its next appointment here.
+
+Rules for whoever edits this file: events of one instant run in the order in which they were
+scheduled, on every machine and in every run; ``now`` never goes back; nothing here may ask what
+time it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Any, Final
+
+__all__ = ["MS", "SECOND", "US", "Appointment", "Kernel", "LineRate", "Ns"]
+
+Ns = int
+"""Nanoseconds of bus time since the kernel's start. Always an int."""
+
+US: Final = 1_000
+MS: Final = 1_000_000
+SECOND: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class LineRate:
+    """How long bytes take on a line: ``bits`` a byte (10 for 8N1, 11 with a ninth bit) at ``baud``."""
+
+    baud: int = 38_400
+    bits: int = 10
+
+    def span(self, count: int) -> Ns:
+        """Line time of ``count`` bytes in a row, ns, truncated once for all of them together."""
+        return count * self.bits * SECOND // self.baud
+
+    def bytes_begun(self, elapsed: Ns) -> int:
+        """How many bytes of a gapless run have begun (strictly) before ``elapsed`` ns."""
+        if elapsed <= 0:
+            return 0
+        begun = elapsed * self.baud // (self.bits * SECOND)
+        return begun + 1 if self.span(begun) < elapsed else begun
+
+
+#: [when, order, callback or None when cancelled or done, arguments]. A list, because heapq compares
+#: it in C and the unique order means that callbacks are never compared. ``Any``: the callback's own
+#: parameters, which the kernel passes on and never looks at.
+Appointment = list[Any]
+
+
+class Kernel:
+    """A queue of appointments and the clock that they move.
+
+    Times are ints, ns since the start. Benchmarked against a bare heapq loop (``make bench``).
+    """
+
+    __slots__ = ("_heap", "_order", "now", "ran")
+
+    def __init__(self, start: Ns = 0) -> None:
+        self._heap: list[Appointment] = []
+        self._order = 0
+        #: Bus time, ns. Read by everybody, written by the kernel alone.
+        self.now: Ns = start
+        #: Events run so far.
+        self.ran = 0
+
+    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Appointment:
+        """Have ``callback(*arguments)`` run at ``when``; a time that has passed means now.
+
+        Returns the appointment, which :meth:`cancel` takes.
+        """
+        if when < self.now:
+            when = self.now
+        self._order = order = self._order + 1
+        appointment: Appointment = [when, order, callback, arguments]
+        heappush(self._heap, appointment)
+        return appointment
+
+    def cancel(self, appointment: Appointment) -> None:
+        """Forget an appointment. One that has run, or was cancelled, is left in peace."""
+        appointment[2] = None
+
+    def next_at(self) -> Ns | None:
+        """When the next event is due; None when nothing is."""
+        heap = self._heap
+        while heap:
+            if heap[0][2] is not None:
+                when: Ns = heap[0][0]
+                return when
+            heappop(heap)
+        return None
+
+    def run_until(self, limit: Ns) -> int:
+        """Run every event due at or before ``limit``, then move the clock there.
+
+        Events may schedule others, which run too if they are due. Returns how many ran. An
+        exception of a callback is a defect of ours: it leaves the clock at its event and comes out.
+        """
+        heap = self._heap
+        ran = 0
+        try:
+            while heap and heap[0][0] <= limit:
+                appointment = heappop(heap)
+                callback = appointment[2]
+                if callback is None:
+                    continue
+                appointment[2] = None
+                self.now = appointment[0]
+                ran += 1
+                callback(*appointment[3])
+        finally:
+            self.ran += ran
+        if limit > self.now:
+            self.now = limit
+        return ran
+
+    def run_next(self) -> bool:
+        """Run all events of the next instant that has any; False when nothing is due ever."""
+        when = self.next_at()
+        if when is None:
+            return False
+        self.run_until(when)
+        return True
+
+    def run(self) -> int:
+        """Run until nothing is due. Returns how many events ran. (Endless motion never ends.)"""
+        before = self.ran
+        while self.run_next():
+            pass
+        return self.ran - before

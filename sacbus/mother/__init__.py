@@ -1,0 +1,31 @@
+"""The master's side. This version: transactions; groups, paths and G-code follow."""
+
+from sacbus.mother.caller import Acknowledged, Caller, Clock, Sent
+from sacbus.mother.errors import (
+    BadRequest,
+    LineLost,
+    MotherError,
+    NoAnswer,
+    Refused,
+    UnknownOutcome,
+)
+from sacbus.mother.mother import Mother, addressed_line
+from sacbus.mother.request import safe_body
+from sacbus.mother.statistics import NodeStatistics
+
+__all__ = [
+    "Acknowledged",
+    "BadRequest",
+    "Caller",
+    "Clock",
+    "LineLost",
+    "Mother",
+    "MotherError",
+    "NoAnswer",
+    "NodeStatistics",
+    "Refused",
+    "Sent",
+    "UnknownOutcome",
+    "addressed_line",
+    "safe_body",
+]

@@ -1,0 +1,268 @@
+"""Transactions: one request at a time on a half-duplex line, and what becomes of it.
+
+Owns whose turn it is, when an answer is overdue, what may be asked again, and the pause after each
+packet. Synchronous; a clock is handed in (the kernel, or a loop's), bytes go out through a callable
+and come in through :meth:`Caller.hear`. Source: spec, mother ("Transactions").
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+from typing import Protocol as Contract
+
+from sacbus.kernel import MS, LineRate, Ns
+from sacbus.language import repeatable
+from sacbus.mother.errors import LineLost, MotherError, NoAnswer, Refused, UnknownOutcome
+from sacbus.mother.request import checked_address, safe_body
+from sacbus.mother.statistics import NodeStatistics
+from sacbus.wire import (
+    GENERAL_CALL,
+    MOTHER,
+    Answer,
+    LineFault,
+    Packet,
+    PacketReceiver,
+    encode,
+)
+from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
+
+__all__ = ["Acknowledged", "Caller", "Clock", "Sent"]
+
+#: How long an answer may be late beyond the line's own figures, on a line in this process: it
+#: covers a port that waits for the line (1 ms) and whatever else talks meanwhile.
+SLACK: Final[Ns] = 10 * MS
+
+#: Attempts for what may be repeated.
+TRIES: Final = 3
+
+
+class Clock(Contract):
+    """Time and appointments; a :class:`~sacbus.kernel.Kernel` is one."""
+
+    @property
+    def now(self) -> Ns:
+        """Ns since some start."""
+        ...
+
+    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Any:
+        """Call back then. What comes back is only good for :meth:`cancel` (hence ``Any``)."""
+        ...
+
+    def cancel(self, appointment: Any) -> None:
+        """Do not call back."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledged:
+    """A node has a packet: after how many attempts, and the last one's round trip in ns."""
+
+    node: int
+    attempts: int
+    round_trip: Ns
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A broadcast is out, and its pause over; nobody answers one."""
+
+
+@dataclass(slots=True)
+class _Request:
+    node: int
+    body: bytes
+    data: bytes
+    done: Callable[[Acknowledged | Sent | MotherError], None]
+    repeatable: bool
+    attempts: int = 0
+    sent_at: Ns = 0
+    last: str = "none"
+
+
+class Caller:
+    """Requests in order, one outstanding. ``send`` takes the bytes of a packet.
+
+    ``slack`` is how much later than the line's own figures an answer may come.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        send: Callable[[bytes], None],
+        *,
+        rate: LineRate | None = None,
+        slack: Ns = SLACK,
+        tries: int = TRIES,
+    ) -> None:
+        self._clock = clock
+        self._send = send
+        self._rate = rate or LineRate()
+        self._slack = slack
+        self._tries = tries
+        self._receiver = PacketReceiver()
+        self._waiting: deque[_Request] = deque()
+        self._outstanding: _Request | None = None
+        self._overdue: Any = None  # the clock's appointment, see Clock.at
+        #: True while the pause after a packet lasts, or a broadcast is on its way.
+        self._pausing = False
+        self._broadcasting: _Request | None = None
+        self._lost: LineLost | None = None
+        self.statistics: defaultdict[int, NodeStatistics] = defaultdict(NodeStatistics)
+        #: Packets of others, answers that nobody waits for, and line faults, counted.
+        self.overheard = 0
+        self.strays = 0
+        self.faults = 0
+
+    def call(
+        self,
+        node: int,
+        line: bytes,
+        done: Callable[[Acknowledged | Sent | MotherError], None],
+        *,
+        accept_duplicates: bool = False,
+    ) -> None:
+        """Have ``node`` receive ``line``; ``done`` is called once, with what became of it.
+
+        Silence is followed by another attempt only if the line may be repeated, or the caller
+        accepts that it may run twice; NAK always is, since a node that says NAK has not acted.
+        :class:`BadRequest` at once for what cannot be sent.
+        """
+        checked_address(node)
+        body = safe_body(line)
+        self._enqueue(
+            _Request(
+                node,
+                body,
+                encode(node, MOTHER, body),
+                done,
+                accept_duplicates or repeatable(line),
+            )
+        )
+
+    def broadcast(
+        self, line: bytes, done: Callable[[Acknowledged | Sent | MotherError], None]
+    ) -> None:
+        """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
+        body = safe_body(line)
+        self._enqueue(
+            _Request(GENERAL_CALL, body, encode(GENERAL_CALL, MOTHER, body), done, False)
+        )
+
+    def hear(self, data: bytes) -> None:
+        """Bytes from the line."""
+        for event in self._receiver.receive(data):
+            if type(event) is Answer:
+                self._answered(event)
+            elif type(event) is LineFault:
+                self.faults += 1
+            elif type(event) is Packet and event.src != MOTHER:
+                self.overheard += 1
+
+    def lose(self, why: str) -> None:
+        """The line is gone: everything that waits fails, and so does all that is asked later."""
+        self._lost = LineLost(why)
+        if self._overdue is not None:
+            self._clock.cancel(self._overdue)
+            self._overdue = None
+        waiting = [self._outstanding, self._broadcasting, *self._waiting]
+        self._outstanding = self._broadcasting = None
+        self._waiting.clear()
+        for request in waiting:
+            if request is not None:
+                request.done(self._lost)
+
+    def _enqueue(self, request: _Request) -> None:
+        if self._lost is not None:
+            request.done(self._lost)
+            return
+        self._waiting.append(request)
+        self._next()
+
+    def _next(self) -> None:
+        """Send the next request if the line is ours."""
+        if self._outstanding is None and not self._pausing and self._waiting:
+            self._attempt(self._waiting.popleft())
+
+    def _attempt(self, request: _Request) -> None:
+        request.attempts += 1
+        clock = self._clock
+        request.sent_at = now = clock.now
+        line_time = self._rate.span(len(request.data))
+        statistics = self.statistics[request.node]
+        statistics.sent += 1
+        if request.attempts > 1:
+            statistics.retries += 1
+        if request.node == GENERAL_CALL:
+            self._pausing = True
+            self._broadcasting = request
+            clock.at(now + line_time + MOTHER_GAP, self._broadcast_over)
+        else:
+            self._outstanding = request
+            answer = turnaround(len(request.body), nul_follows=True)
+            answer += self._rate.span(ANSWER_BYTES)
+            self._overdue = clock.at(now + line_time + answer + self._slack, self._silent)
+        self._send(request.data)
+
+    def _answered(self, answer: Answer) -> None:
+        request = self._outstanding
+        if request is None or answer.dest != MOTHER or answer.src != request.node:
+            self.strays += 1
+            return
+        self._outstanding = None
+        self._clock.cancel(self._overdue)
+        self._overdue = None
+        statistics = self.statistics[request.node]
+        self._pause()
+        if answer.accepted:
+            round_trip = self._clock.now - request.sent_at
+            statistics.acks += 1
+            statistics.round_trips.append(round_trip)
+            request.done(Acknowledged(request.node, request.attempts, round_trip))
+            return
+        statistics.naks += 1
+        request.last = "NAK"
+        if request.attempts < self._tries:
+            self._waiting.appendleft(request)
+        else:
+            request.done(self._failure(Refused, request))
+
+    def _silent(self) -> None:
+        request = self._outstanding
+        if request is None:
+            return
+        self._outstanding = None
+        self._overdue = None
+        self.statistics[request.node].timeouts += 1
+        request.last = "silence"
+        if not request.repeatable:
+            request.done(self._failure(UnknownOutcome, request))
+        elif request.attempts < self._tries:
+            self._waiting.appendleft(request)
+        else:
+            request.done(self._failure(NoAnswer, request))
+        self._next()
+
+    def _pause(self) -> None:
+        """Leave the node the time in which it is deaf."""
+        self._pausing = True
+        self._clock.at(self._clock.now + MOTHER_GAP, self._pause_over)
+
+    def _pause_over(self) -> None:
+        self._pausing = False
+        self._next()
+
+    def _broadcast_over(self) -> None:
+        self._pausing = False
+        request, self._broadcasting = self._broadcasting, None
+        if request is not None:
+            request.done(Sent())
+        self._next()
+
+    def _failure(
+        self, kind: type[Refused] | type[NoAnswer] | type[UnknownOutcome], request: _Request
+    ) -> MotherError:
+        line = request.body.decode("latin-1").rstrip(" ")
+        return kind(request.node, line, request.attempts, request.last)

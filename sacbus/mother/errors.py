@@ -1,0 +1,61 @@
+"""What can go wrong between mother and a node; one small tree.
+
+    MotherError                 everything below
+    ├── BadRequest (ValueError)     we were asked to send what no node could receive
+    ├── Refused                     the node answered NAK, every time
+    ├── NoAnswer (TimeoutError)     silence, and what was asked may safely be asked again
+    ├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
+    └── LineLost (ConnectionError)  the link is gone
+"""
+
+from __future__ import annotations
+
+__all__ = ["BadRequest", "LineLost", "MotherError", "NoAnswer", "Refused", "UnknownOutcome"]
+
+
+class MotherError(Exception):
+    """Something that mother was asked for did not happen, or may not have."""
+
+
+class BadRequest(MotherError, ValueError):
+    """The line cannot be sent as asked; nothing was sent."""
+
+
+class _Unanswered(MotherError):
+    """Fields common to what can come of a request: who, what, how often, and what came last."""
+
+    #: What it says of the outcome; in the subclasses.
+    verdict = ""
+
+    def __init__(self, node: int, line: str, attempts: int, last: str) -> None:
+        self.node = node
+        self.line = line
+        self.attempts = attempts
+        self.last = last
+        times = "once" if attempts == 1 else f"{attempts} times"
+        super().__init__(f"node {node}: {line!r} sent {times}, last answer {last}: {self.verdict}")
+
+
+class Refused(_Unanswered):
+    """NAK: the packet arrived damaged, every time. The node has not acted."""
+
+    verdict = "not executed; check the line, or the node's CRC setting"
+
+
+class NoAnswer(_Unanswered, TimeoutError):
+    """Silence, every time. What was asked may be asked again without harm."""
+
+    verdict = "nobody at that address, or its ACK is switched off"
+
+
+class UnknownOutcome(_Unanswered, TimeoutError):
+    """Silence after a command that must not run twice: the node may have executed it, or not.
+
+    SAC has no sequence numbers, so a lost ACK cannot be told from a lost packet.
+    """
+
+    verdict = "it may have been executed; look at the node before you send it again"
+
+
+class LineLost(MotherError, ConnectionError):
+    """The link to the line is gone."""

@@ -1,0 +1,167 @@
+"""Mother for coroutines: connect to a line, send a command, get an answer or a typed error.
+
+Owns the meeting of the transactions (``caller.py``) with asyncio and with a link; no rule of its
+own. The same class drives a bus hosted in this process and a serial port.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
+from typing import Any, Final
+
+from sacbus.kernel import MS, SECOND, LineRate, Ns
+from sacbus.links import open_line
+from sacbus.mother.caller import SLACK, Acknowledged, Caller, Clock, Sent
+from sacbus.mother.errors import BadRequest, MotherError
+from sacbus.mother.statistics import NodeStatistics
+
+__all__ = ["LINK_SLACK", "LoopClock", "Mother", "addressed_line"]
+
+#: How late an answer may be on a link out of this process: a USB adapter's 16 ms latency timer
+#: both ways, and a busy machine.
+LINK_SLACK: Final[Ns] = 100 * MS
+
+_ADDRESSED: Final = re.compile(r"(\d+)(.*)", re.DOTALL)
+
+
+class LoopClock:
+    """An event loop's clock for :class:`Caller`: ns since this object was made."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._start = loop.time()
+
+    @property
+    def now(self) -> Ns:
+        """Ns since the start."""
+        return int((self._loop.time() - self._start) * SECOND)
+
+    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Any:
+        """Call back then; gives the loop's timer handle."""
+        return self._loop.call_at(self._start + when / SECOND, callback, *arguments)
+
+    def cancel(self, appointment: asyncio.TimerHandle) -> None:
+        """Do not call back."""
+        appointment.cancel()
+
+
+class Mother:
+    """Address 1: sends commands, waits for ACKs, keeps count.
+
+    One request is outstanding at a time, in the order of the calls; any number of tasks may call.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        send: Callable[[bytes], None],
+        *,
+        rate: LineRate | None = None,
+        slack: Ns = SLACK,
+        arrive: Callable[..., None] | None = None,
+    ) -> None:
+        """``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a
+        host's, when mother sits on a bus in this process."""
+        self._caller = Caller(clock, send, rate=rate, slack=slack)
+        self._arrive = arrive or _call
+
+    @classmethod
+    @asynccontextmanager
+    async def connect(cls, link: str, *, baud: int = 38_400) -> AsyncIterator[Mother]:
+        """Mother on a serial port or pty, for an ``async with`` block.
+
+        ``link`` is a path. Raises :class:`~sacbus.links.LinkError` when it cannot be opened; a line
+        lost later raises :class:`LineLost` in every call.
+        """
+        clock = LoopClock(asyncio.get_running_loop())
+        async with open_line(link, baud) as line:
+            mother = cls(clock, line.send, rate=LineRate(baud), slack=LINK_SLACK)
+            line.start(mother.hear, mother.lose)
+            yield mother
+
+    @property
+    def statistics(self) -> Mapping[int, NodeStatistics]:
+        """Counts and round trips by node; address 0 holds the broadcasts."""
+        return self._caller.statistics
+
+    def hear(self, data: bytes) -> None:
+        """The link's side: bytes from the line."""
+        self._caller.hear(data)
+
+    def lose(self, why: str) -> None:
+        """The link's side: the line is gone."""
+        self._caller.lose(why)
+
+    async def send(
+        self, node: int, line: str | bytes, *, accept_duplicates: bool = False
+    ) -> Acknowledged:
+        """Send one command line to a node and wait for its ACK.
+
+        Raises :class:`Refused`, :class:`NoAnswer`, :class:`UnknownOutcome`, :class:`LineLost`, and
+        :class:`BadRequest` for what cannot be sent. ``accept_duplicates`` lets a command that is
+        not idempotent be sent again after silence; it may then run twice.
+        """
+        outcome = await self._outcome(
+            lambda done: self._caller.call(
+                node, _bytes(line), done, accept_duplicates=accept_duplicates
+            )
+        )
+        if not isinstance(outcome, Acknowledged):
+            raise TypeError(f"an addressed packet ended in {outcome!r}")
+        return outcome
+
+    async def broadcast(self, line: str | bytes) -> None:
+        """Send a line to all nodes; returns when the next packet may follow. Nobody answers."""
+        await self._outcome(lambda done: self._caller.broadcast(_bytes(line), done))
+
+    async def _outcome(
+        self, ask: Callable[[Callable[[Acknowledged | Sent | MotherError], None]], None]
+    ) -> Acknowledged | Sent:
+        future: asyncio.Future[Acknowledged | Sent] = asyncio.get_running_loop().create_future()
+
+        def done(outcome: Acknowledged | Sent | MotherError) -> None:
+            if future.done():
+                return  # the caller was cancelled; the packet was sent all the same
+            if isinstance(outcome, MotherError):
+                future.set_exception(outcome)
+            else:
+                future.set_result(outcome)
+
+        self._arrive(ask, done)
+        return await future
+
+
+def addressed_line(text: str) -> tuple[int, str]:
+    """``85m3000a2d1`` as a terminal reads it: (85, "m3000a2d1"); address 0 is everybody.
+
+    A space or dot after the address stays: what follows is then a message. :class:`BadRequest`
+    when there is no address, or none that a node can have.
+    """
+    found = _ADDRESSED.fullmatch(text)
+    if found is None:
+        raise BadRequest(
+            f"line {text!r}: expected an address before the command, as in 85m3000a2d1 "
+            "(0 for all nodes)"
+        )
+    node = int(found[1])
+    if node > 255:
+        raise BadRequest(f"node {node}: expected an address from 4 to 255, or 0 for all nodes")
+    return node, found[2]
+
+
+def _call(callback: Callable[..., object], *arguments: object) -> None:
+    callback(*arguments)
+
+
+def _bytes(line: str | bytes) -> bytes:
+    if isinstance(line, bytes):
+        return line
+    try:
+        return line.encode("latin-1")
+    except UnicodeEncodeError as fault:
+        raise BadRequest(
+            f"line {line!r}: expected characters of one byte, got {line[fault.start]!r}"
+        ) from fault

@@ -1,0 +1,53 @@
+"""What mother sends: a body made safe for the firmware's receiver.
+
+Owns the rules by which a body reaches a SAC checked: no bytes that end or break a packet, no CRC
+byte that the device takes for something else, no addresses that it cannot have.
+Source: spec, wire ("Bodies that a device loses or accepts unchecked, and the cure").
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sacbus.mother.errors import BadRequest
+from sacbus.wire import ACK, ETX, MAX_BODY, NUL, STX, crc8
+
+__all__ = ["checked_address", "safe_body"]
+
+#: CRC bytes that the device takes for "no CRC", a new packet, a second ETX.
+_UNSAFE_CRCS: Final = frozenset((NUL, STX, ETX))
+
+_UNSAFE_BYTES: Final = {NUL: "NUL", STX: "STX", ETX: "ETX", ACK: "ACK"}
+
+
+def safe_body(body: bytes) -> bytes:
+    """``body`` with as many trailing spaces (0 to 2) as give it a CRC that every device checks.
+
+    A space ends a command, and what follows it is ignored, so nothing else changes. The empty body
+    is left alone (its CRC is 00, and a space would make it a message). :class:`BadRequest` for
+    bytes 00, 02, 03 and 06, and for what is longer than 46 with its spaces.
+    """
+    for value in body:
+        if value in _UNSAFE_BYTES:
+            raise BadRequest(
+                f"line {body.decode('latin-1')!r}: byte {value:02x} ({_UNSAFE_BYTES[value]}) would "
+                "end or break the packet; leave it out"
+            )
+    sent = body
+    while body and crc8(sent) in _UNSAFE_CRCS:
+        sent += b" "
+    if len(sent) > MAX_BODY:
+        spaces = len(sent) - len(body)
+        needs = f" and {spaces} trailing space(s) for its CRC" if spaces else ""
+        raise BadRequest(
+            f"line {body.decode('latin-1')!r}: expected at most {MAX_BODY} characters, got "
+            f"{len(body)}{needs}; split it"
+        )
+    return sent
+
+
+def checked_address(node: int) -> int:
+    """``node`` if a SAC can have it: 4 to 255 (0 is everybody, 1 mother, 2 and 3 STX and ETX)."""
+    if not 4 <= node <= 255:
+        raise BadRequest(f"node {node}: expected an address from 4 to 255")
+    return node

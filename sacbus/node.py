@@ -1,0 +1,329 @@
+"""The contract between the bus and a kind of node, and the registry of kinds.
+
+Owns the shapes in which the two meet: what a node hears (:class:`Heard`), what it can be asked
+(:class:`Node`), what it tells out of band (:class:`Report`), what a wire protocol must answer
+(:class:`Protocol`), and how kinds are found: through entry points of the group ``sacbus.nodes``,
+the project's own no differently from a third party's. Time is always an argument, in ns of bus
+time. Nothing here knows a particular protocol or kind.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from importlib.metadata import entry_points
+from typing import Any, Final
+from typing import Protocol as Contract
+
+from sacbus.kernel import LineRate, Ns
+
+__all__ = [
+    "EVERYONE",
+    "GROUP",
+    "Decoder",
+    "Heard",
+    "KindError",
+    "Node",
+    "NodeKind",
+    "NodeSettings",
+    "Protocol",
+    "Report",
+    "ReportKind",
+    "Setting",
+    "SettingError",
+    "Snapshot",
+    "find_kind",
+    "kinds",
+    "settings_from",
+    "setting_list",
+]
+
+GROUP: Final = "sacbus.nodes"
+
+#: What :meth:`Protocol.addressed` gives when all nodes must hear.
+EVERYONE: Final = None
+
+
+@dataclass(slots=True)
+class Heard:
+    """Some bytes of one transmission as they arrived, with their times.
+
+    ``data`` is what came over the wire, garbled where transmissions overlapped. Its first byte is
+    number ``first`` of a transmission that started at ``start``; bytes follow without a pause.
+    ``followed`` is True when the next byte of the same transmission begins as the last one ends.
+    """
+
+    data: bytes
+    start: Ns
+    first: int
+    rate: LineRate
+    followed: bool
+
+    def begins(self, index: int) -> Ns:
+        """When byte ``index`` of ``data`` began (its start bit)."""
+        return self.start + self.rate.span(self.first + index)
+
+    def ends(self, index: int) -> Ns:
+        """When byte ``index`` of ``data`` had arrived (the end of its stop bit)."""
+        return self.start + self.rate.span(self.first + index + 1)
+
+    def begun_before(self, moment: Ns) -> int:
+        """How many bytes of ``data`` began before ``moment``."""
+        begun = self.rate.bytes_begun(moment - self.start) - self.first
+        return min(max(begun, 0), len(self.data))
+
+
+class ReportKind(Enum):
+    """What a report is about; the value is the word that users see."""
+
+    REFUSED = "refused"  #: a line, or a part of one, that the node does not understand
+    IGNORED = "ignored"  #: understood, but without effect now
+    MESSAGE = "message"  #: text for the node's terminal
+    OVERRUN = "queue overrun"
+    WARNING = "warning"  #: obeyed, but it may not be what was meant
+    LOST = "lost"  #: a packet that the device loses by its nature
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Something a node says out of band: never on the wire, never an exception.
+
+    ``line`` is the command line it is about, ``column`` the place in it (from 1; 0: the whole).
+    """
+
+    when: Ns
+    address: int
+    kind: ReportKind
+    text: str
+    line: str = ""
+    column: int = 0
+
+    def __str__(self) -> str:
+        where = f" in {self.line!r}" if self.line else ""
+        place = f", column {self.column}" if self.column else ""
+        return f"node {self.address}: {self.kind.value}{where}{place}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """A node at one instant, for dashboards and scenarios. Positions are signed, clockwise up."""
+
+    address: int
+    kind: str
+    state: str
+    position_steps: float
+    position_pulses: int
+    rpm: float
+    current: str
+    pending: tuple[str, ...]
+    counters: Mapping[str, int]
+
+
+class Node(Contract):
+    """A device on the bus: a synchronous state machine that is told the time.
+
+    The bus calls :meth:`hear` with bytes that may concern it, asks :meth:`wake_at` after every call
+    and calls :meth:`wake` then. A node never raises for anything it hears.
+    """
+
+    @property
+    def address(self) -> int:
+        """The address it answers to now."""
+        ...
+
+    @property
+    def receiving(self) -> bool:
+        """True while its receiver stands open: bytes that are not for it may still matter to it."""
+        ...
+
+    def hear(self, heard: Heard, now: Ns) -> None:
+        """Bytes have arrived; ``now`` is when the last of them ended."""
+        ...
+
+    def wake_at(self) -> Ns | None:
+        """When the node has something to do next: an answer, a change of state; never a pulse."""
+        ...
+
+    def wake(self, now: Ns) -> bytes | None:
+        """Do what is due, and give the bytes that the node begins to send at ``now``, if any."""
+        ...
+
+    def snapshot(self, now: Ns) -> Snapshot:
+        """What can be seen of it at ``now``; changes nothing."""
+        ...
+
+    def persist(self) -> Mapping[str, int]:
+        """The contents of its EEPROM."""
+        ...
+
+    def restore(self, memory: Mapping[str, int]) -> None:
+        """Start with this EEPROM, as after a cold boot. Unknown or odd values are reported."""
+        ...
+
+
+class Decoder(Contract):
+    """Bytes of a line to what they say; events are the protocol's own types."""
+
+    def receive(self, data: bytes) -> Sequence[object]:
+        """The events that these bytes complete. Never raises."""
+        ...
+
+
+class Protocol(Contract):
+    """What the bus must know of a wire protocol; stateless but for its decoders."""
+
+    @property
+    def name(self) -> str:
+        """As in a configuration: ``sac``."""
+        ...
+
+    @property
+    def lanes(self) -> int:
+        """1: everybody on one pair of wires. 2: the master talks on one, the nodes on the other."""
+        ...
+
+    @property
+    def rate(self) -> LineRate:
+        """The line rate that its devices leave the factory with."""
+        ...
+
+    def cuts(self, data: bytes) -> Sequence[int]:
+        """Offsets at which a node may have to act before the transmission is over, ascending."""
+        ...
+
+    def addressed(self, data: bytes) -> Sequence[int] | None:
+        """Addresses that these bytes open a packet for; EVERYONE when all nodes must hear."""
+        ...
+
+    def decoder(self) -> Decoder:
+        """A new receiver for those who listen to everything."""
+        ...
+
+    def describe(self, event: object) -> str:
+        """One of the decoder's events in words."""
+        ...
+
+
+@dataclass(frozen=True)
+class NodeSettings:
+    """Base of a kind's settings: a frozen dataclass whose fields carry :func:`setting` metadata."""
+
+
+class NodeKind(Contract):
+    """A kind of node, as an entry point of the group ``sacbus.nodes`` gives it."""
+
+    @property
+    def name(self) -> str:
+        """The word after ``--kind``."""
+        ...
+
+    @property
+    def summary(self) -> str:
+        """One line for people."""
+        ...
+
+    @property
+    def protocol(self) -> Protocol:
+        """The protocol its nodes speak."""
+        ...
+
+    @property
+    def settings(self) -> type[NodeSettings]:
+        """The settings that a configuration may give."""
+        ...
+
+    def create(
+        self, address: int, settings: Any, rate: LineRate, tell: Callable[[Report], None]
+    ) -> Node:
+        """A new node with factory memory. ``settings`` is an instance of :attr:`settings` (``Any``
+        because each kind has a type of its own); ``tell`` takes what it reports out of band."""
+        ...
+
+
+class KindError(LookupError):
+    """A node kind that is not installed, or that could not be loaded. The text is for users."""
+
+
+def kinds() -> dict[str, NodeKind]:
+    """All installed kinds by name, sorted. A broken one raises :class:`KindError` naming it."""
+    return {
+        entry.name: _load(entry) for entry in sorted(entry_points(group=GROUP), key=lambda e: e.name)
+    }
+
+
+def find_kind(name: str) -> NodeKind:
+    """The kind of that name; :class:`KindError` says which there are."""
+    found = entry_points(group=GROUP)
+    for entry in found:
+        if entry.name == name:
+            return _load(entry)
+    have = ", ".join(sorted({entry.name for entry in found})) or "none: is sacbus installed?"
+    raise KindError(f"node kind {name!r} is not installed; installed kinds: {have}")
+
+
+def _load(entry: Any) -> NodeKind:
+    # Any: importlib.metadata's EntryPoint is not generic in what it loads.
+    try:
+        kind: NodeKind = entry.load()
+    except Exception as fault:  # a third party's import may fail in any way; we name it and pass on
+        raise KindError(
+            f"node kind {entry.name!r} ({entry.value}) cannot be loaded: {fault!r}; "
+            "mend or uninstall its package"
+        ) from fault
+    return kind
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One setting of a kind, for help texts: its name, default, what is allowed, what it means."""
+
+    name: str
+    default: object
+    allowed: str
+    help: str
+
+
+class SettingError(ValueError):
+    """A setting that a kind does not take: which, what was expected, what came."""
+
+
+def setting_list(model: type[NodeSettings]) -> list[Setting]:
+    """The settings of a kind in the order of their declaration."""
+    return [
+        Setting(
+            field.name, field.default, _allowed(field.metadata, field.default), field.metadata["help"]
+        )
+        for field in dataclasses.fields(model)
+    ]
+
+
+def settings_from(model: type[NodeSettings], given: Mapping[str, object]) -> NodeSettings:
+    """Settings checked against their model; :class:`SettingError` for the first that does not fit."""
+    fields = {field.name: field for field in dataclasses.fields(model)}
+    for name, value in given.items():
+        field = fields.get(name)
+        if field is None:
+            raise SettingError(f"setting {name!r}: expected one of {', '.join(fields)}")
+        if not _fits(field.metadata, field.default, value):
+            raise SettingError(
+                f"setting {name!r}: expected {_allowed(field.metadata, field.default)}, got {value!r}"
+            )
+    return model(**given)
+
+
+def _fits(metadata: Mapping[str, Any], default: object, value: object) -> bool:
+    if "choices" in metadata:
+        return value in metadata["choices"]
+    if isinstance(default, bool) or isinstance(value, bool):
+        return isinstance(default, bool) and isinstance(value, bool)
+    return isinstance(value, int) and metadata["low"] <= value <= metadata["high"]
+
+
+def _allowed(metadata: Mapping[str, Any], default: object) -> str:
+    if "choices" in metadata:
+        return " or ".join(metadata["choices"])
+    if isinstance(default, bool):
+        return "true or false"
+    return f"a whole number from {metadata['low']} to {metadata['high']}"

@@ -1,0 +1,135 @@
+"""The state directory: one small file per node's EEPROM, never half written.
+
+Owns where and how persistent memory lies on disk: ``DIR/BUS/ADDRESS``, JSON with a check value,
+replaced atomically. A file that cannot be trusted is kept aside and reported; the node then starts
+with factory values, as a device with a worn EEPROM would.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from platformdirs import user_state_path
+
+__all__ = ["StateDirectory", "StateError", "default_directory"]
+
+_FORMAT: Final = 1
+
+
+class StateError(OSError):
+    """The state directory cannot be used; the text says what, where and what to do."""
+
+
+def default_directory() -> Path:
+    """The user's own state directory for sacbus."""
+    return user_state_path("sacbus")
+
+
+class StateDirectory:
+    """EEPROM files of one bus."""
+
+    def __init__(self, directory: Path, bus: str) -> None:
+        self._place = directory / bus
+
+    def path(self, address: int) -> Path:
+        """Where the memory of the node configured at ``address`` lies."""
+        return self._place / str(address)
+
+    def load(self, address: int, kind: str) -> tuple[dict[str, int] | None, str | None]:
+        """The stored memory, if there is one that can be trusted, and a remark if there is not.
+
+        A damaged file, or one of another kind of node, is renamed to ``ADDRESS.damaged`` (the next
+        to ``.damaged.2`` and so on), so that nothing is lost.
+        """
+        path = self.path(address)
+        try:
+            content = path.read_bytes()
+        except FileNotFoundError:
+            return None, None
+        except OSError as fault:
+            raise self._unusable("read", path, fault) from fault
+        memory, wrong = _decode(content, kind)
+        if memory is not None:
+            return memory, None
+        aside = _free_name(path)
+        try:
+            path.rename(aside)
+        except OSError as fault:
+            raise self._unusable("set aside", path, fault) from fault
+        return None, f"EEPROM file {path}: {wrong}; kept as {aside.name}, factory values used"
+
+    def save(self, address: int, kind: str, memory: Mapping[str, int]) -> None:
+        """Write a memory; whatever happens, the file is either the old or the new one."""
+        path = self.path(address)
+        content = _encode(kind, memory)
+        fresh = path.with_name(f".{path.name}.{os.getpid()}.new")
+        try:
+            self._place.mkdir(parents=True, exist_ok=True)
+            with fresh.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            fresh.replace(path)
+        except OSError as fault:
+            fresh.unlink(missing_ok=True)
+            raise self._unusable("write", path, fault) from fault
+
+    def check(self) -> None:
+        """Make sure now that memory can be saved later; StateError otherwise."""
+        try:
+            self._place.mkdir(parents=True, exist_ok=True)
+        except OSError as fault:
+            raise self._unusable("create", self._place, fault) from fault
+        if not os.access(self._place, os.W_OK | os.X_OK):
+            raise StateError(
+                f"cannot write the state directory, {self._place}, "
+                "choose another with --state DIR, or --ephemeral to keep nothing"
+            )
+
+    @staticmethod
+    def _unusable(what: str, path: Path, fault: OSError) -> StateError:
+        return StateError(
+            f"cannot {what} node memory ({fault.strerror or fault}), {path}, "
+            "choose another directory with --state DIR, or --ephemeral to keep nothing"
+        )
+
+
+def _encode(kind: str, memory: Mapping[str, int]) -> bytes:
+    body = {"format": _FORMAT, "kind": kind, "memory": dict(memory)}
+    return (json.dumps({**body, "check": _check(body)}, indent=1) + "\n").encode()
+
+
+def _decode(content: bytes, kind: str) -> tuple[dict[str, int] | None, str]:
+    """The memory, or None and what is wrong with the file."""
+    try:
+        stored = json.loads(content)
+    except ValueError:
+        return None, "not readable as JSON"
+    if not isinstance(stored, dict) or not isinstance(stored.get("memory"), dict):
+        return None, "not a node's memory"
+    check = stored.pop("check", None)
+    if check != _check(stored):
+        return None, f"check value {check!r} does not match the content"
+    if stored.get("format") != _FORMAT:
+        return None, f"format {stored.get('format')!r}, this version reads {_FORMAT}"
+    if stored.get("kind") != kind:
+        return None, f"of a node of kind {stored.get('kind')!r}, not {kind!r}"
+    return stored["memory"], ""
+
+
+def _check(body: Mapping[str, object]) -> int:
+    return zlib.crc32(json.dumps(body, sort_keys=True).encode())
+
+
+def _free_name(path: Path) -> Path:
+    candidate = path.with_name(f"{path.name}.damaged")
+    number = 1
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f"{path.name}.damaged.{number}")
+    return candidate
