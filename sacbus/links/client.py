@@ -65,7 +65,9 @@ class Line(asyncio.Protocol):
         self._transport = None
         if self._closing:
             return
-        self._lost = f"the line is gone ({exc or 'closed by the other end'}), {self._where}, open it again"
+        self._lost = (
+            f"the line is gone ({exc or 'closed by the other end'}), {self._where}, open it again"
+        )
         if self._lose is not None:
             self._lose(self._lost)
 
