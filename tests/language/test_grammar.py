@@ -37,6 +37,7 @@ def remarked(line: bytes | str) -> list[tuple[int, str]]:
 # --- any line ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=300) | st.text() | nearly_moves)
 @example("m" + "9" * 5000)
 @example("m1a" + "9" * 5000)
@@ -57,6 +58,9 @@ def test_no_line_raises_and_what_does_nothing_says_why(line: bytes | str) -> Non
 @example("m200v100a1d1")
 @example("m1a.5d0.05l1u99t999999999s0pvva1.d12.")
 @example("m1a1.239d100.9")
+@example("m1v100vc2000s1p")
+@example("m1vc2000v100")
+@example("m1vc2000v")
 @example("mv0v")  # a value that is overwritten is remarked all the same
 @example("m1a0a1d.00d")
 def test_the_short_cut_and_the_readers_are_one_language(line: str) -> None:

@@ -248,3 +248,11 @@ def test_each_changed_value_alone_makes_a_new_session() -> None:
     ):
         assert FACTORY.resolve(move)[1] != FACTORY
     assert FACTORY.resolve(Move(1, rpm=BARE, acc100=BARE, dec100=BARE, linear=False))[1] is FACTORY
+
+
+def test_the_same_cycle_with_another_rpm_is_another_session() -> None:
+    # 701 RPM is a cycle of 427 us, which is 702 RPM.
+    _, by_rpm = resolved("m1v701")
+    _, by_cycle = resolved("m1vc427", by_rpm)
+    assert (by_rpm.rpm, by_rpm.cycle_us) == (701, 427)
+    assert (by_cycle.rpm, by_cycle.cycle_us) == (702, 427)
