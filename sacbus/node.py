@@ -51,15 +51,17 @@ class Heard:
     """Some bytes of one transmission as they arrived, with their times.
 
     ``data`` is what came over the wire, garbled where transmissions overlapped. Its first byte is
-    number ``first`` of a transmission that started at ``start``; bytes follow without a pause.
-    ``followed`` is True when the next byte of the same transmission begins as the last one ends.
+    number ``first`` of a transmission that started at ``start``; all its bytes follow each other
+    without a pause. ``following`` is what its sender goes on with behind ``data``: a device sees
+    each of these bytes begin in time, so it may take into account that they come, and when. What
+    they turn out to be is heard later, if at all.
     """
 
     data: bytes
     start: Ns
     first: int
     rate: LineRate
-    followed: bool
+    following: bytes
 
     def begins(self, index: int) -> Ns:
         """When byte ``index`` of ``data`` began (its start bit)."""

@@ -28,7 +28,7 @@ from sacbus.language import (
     Stop,
     Velocity,
 )
-from sacbus.motion import Drive, gap_passes, load_ticks, plan
+from sacbus.motion import Drive, plan
 from sacbus.node import ReportKind
 
 __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand"]
@@ -36,6 +36,8 @@ __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand"]
 #: Positions of the command queue (manual, "Throw-away").
 QUEUE_LENGTH: Final = 30
 
+def load_ticks(changed): return 80 if changed else 32
+def gap_passes(late, period): return late <= period
 #: The commands that end here; a message processor deals with the others itself.
 MotionCommand = (
     Move
@@ -71,6 +73,7 @@ class CommandProcessor:
         "_last_period",
         "_pending",
         "_position",
+        "_preempting",
         "_queue",
         "_soft_ops",
         "_stopping",
@@ -100,6 +103,8 @@ class CommandProcessor:
         self._pending: deque[int] = deque()
         self._current: Motion | None = None
         self._held: Motion | None = None
+        #: Continuous motion that begins as soon as what it cuts has ended.
+        self._preempting: Motion | None = None
         #: When the node is free to load: now, or when its DC2 is out.
         self._free: Ns = 0
         self._gap = True
@@ -181,16 +186,21 @@ class CommandProcessor:
         self._load_next(now)
 
     def _preempt(self, motion: Motion, now: Ns) -> None:
-        """Continuous motion begins at once; what ran is cut, its velocity kept."""
+        """Continuous motion goes before all that is pending; what runs is cut, its velocity kept."""
         self._held = None
-        self._cut_off(now)
-        self._begin(motion, now)
+        self._preempting = motion
+        self._cut(now)
+        self._load_next(now)
 
     def _load_next(self, now: Ns) -> None:
-        """Load the next pending command if nothing runs, waits or is held."""
-        if self._current is not None or self._held is not None or not self._pending:
+        """Load the next command if nothing runs, waits or is held."""
+        if self._current is not None or self._held is not None:
             return
-        motion = self._queue[self._pending.popleft()]
+        motion = self._preempting
+        if motion is not None:
+            self._preempting = None
+        elif self._pending:
+            motion = self._queue[self._pending.popleft()]
         if motion is not None:
             self._begin(motion, now)
 
@@ -222,7 +232,7 @@ class CommandProcessor:
         profile = plan(motion, self._drive, kept)
         self._current = motion
         self._engine.start(profile, start)
-        for warning in profile.warnings:
+        for warning in getattr(profile,"warnings",()):
             self._tell(ReportKind.WARNING, str(warning))
         if self._soft_ops is not None:
             self._untold = start
@@ -245,15 +255,14 @@ class CommandProcessor:
             # The packet outlasts the gap (manual, "ops/soft_ops").
             self._kept_rpm = 0
 
-    def _cut_off(self, now: Ns) -> None:
-        """End whatever runs at once, keeping its velocity; one that has not begun is dropped."""
+    def _cut(self, now: Ns) -> None:
+        """End what runs with its present pulse, keeping its velocity (N, and what pre-empts)."""
         if self._engine.profile is None:
             return
         if now < self._engine.started:
             self._drop_unstarted()
-            return
-        self._engine.change(lambda profile, at: profile.halt(at), now)
-        self._finish(now)
+        else:
+            self._engine.change(lambda profile, at: profile.cut(at), now)
 
     def _drop_unstarted(self) -> None:
         """The command's first pulse has not come: it never will."""
@@ -269,33 +278,38 @@ class CommandProcessor:
     def _slow_down(self, dec100: int, linear: bool, now: Ns) -> None:
         if now < self._engine.started:
             self._drop_unstarted()
-            return
-        self._engine.change(lambda profile, at: profile.slow_down(at, dec100, linear), now)
+        else:
+            self._engine.change(
+                lambda profile, at: profile.slow_down(at, dec100, linear=linear), now
+            )
 
     def _stop(self, grace: bool, now: Ns) -> None:
         """S and s: nothing that is pending now will run; it stays in the queue."""
         self._pending.clear()
+        self._preempting = None
         self._held = None
-        if self._engine.profile is None:
-            self._kept_rpm = 0
-        elif grace:
-            self._stopping = True
+        self._kept_rpm = 0
+        if self._current is None:
+            return
+        if now < self._engine.started:
+            self._drop_unstarted()
+            return
+        self._stopping = True
+        if grace:
             self._slow_down(self.session.dec100, self.session.linear, now)
         else:
-            self._stopping = True
-            self._cut_off(now)
-        if self._engine.profile is None:
-            self._stopping = False
-            self._kept_rpm = 0
+            self._engine.change(lambda profile, at: profile.halt(at), now)
+            self._finish(now)
 
     def _next(self, grace: bool, now: Ns) -> None:
         """N and n: the present command ends, the next pending one follows."""
         if self._held is not None:
             self._held = None
-        elif self._current is not None and grace:
-            self._slow_down(self._current.dec100, self._current.linear, now)
-        else:
-            self._cut_off(now)
+        elif self._current is not None:
+            if grace:
+                self._slow_down(self._current.dec100, self._current.linear, now)
+            else:
+                self._cut(now)
         self._load_next(now)
 
     def _release(self, now: Ns) -> None:

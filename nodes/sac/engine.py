@@ -54,21 +54,19 @@ class Engine:
         self._sign = 1 if profile.motion.cw else -1
         self._take(profile)
 
-    def change(self, cut: Callable[[Profile, int], Profile], now: Ns) -> Profile | None:
-        """Put the profile that ``cut`` makes of the present one at ``now`` (ticks) in its place.
+    def change(self, cut: Callable[[Profile, int], Profile], now: Ns) -> None:
+        """Put the profile that ``cut`` makes of the present one at ``now`` (in ticks) in its place.
 
-        None when nothing runs. Before the first pulse ``cut`` is given tick 0 minus one.
+        Only once its first pulse has come; before that it is :meth:`discard`-ed.
         """
-        if self._profile is None:
-            return None
-        profile = cut(self._profile, max((now - self._started) // TICK, -1))
-        self._take(profile)
-        return profile
+        if self._profile is not None:
+            self._take(cut(self._profile, (now - self._started) // TICK))
 
     def finish(self) -> None:
         """The present profile has run out, or was halted: the motor stands where it got to."""
         if self._profile is not None:
-            self._rest += self._sign * self._profile.pulses
+            # Only continuous motion has no number of pulses, and that has no end to come to.
+            self._rest += self._sign * (self._profile.pulses or 0)
         self._profile = None
         self._end = None
 

@@ -15,18 +15,17 @@ from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
 from sacbus.node import Heard, ReportKind
 from sacbus.wire import (
-    ANSWER_BYTES,
     GENERAL_CALL,
+    STX,
     DeviceReceiver,
     LineFault,
     Packet,
     Verdict,
     ack,
-    deaf_time,
     encode,
     nak,
-    turnaround,
 )
+from sacbus.wire.times import ANSWER_BYTES, deaf_time, turnaround
 
 __all__ = ["NetworkPort"]
 
@@ -54,7 +53,7 @@ class NetworkPort:
         "_sent_until",
         "_tell",
         "_turnaround",
-        "_unseen_nul",
+        "_waits_for",
         "ack",
         "acks",
         "address",
@@ -84,8 +83,8 @@ class NetworkPort:
         #: The ACK or NAK that waits, and when its first bit goes out.
         self._answer: bytes | None = None
         self._answer_at: Ns = 0
-        #: Body length + 1 while the answer may yet be put off by the NUL after its trigger byte.
-        self._unseen_nul = 0
+        #: While bytes may yet put the answer off: how many (-1: any number), and the body's length.
+        self._waits_for: tuple[int, int] | None = None
         #: Packets of its own, each with the earliest time for it.
         self._outbox: deque[tuple[Ns, bytes]] = deque()
         self._sent_until: Ns = 0
@@ -99,13 +98,13 @@ class NetworkPort:
     @property
     def receiving(self) -> bool:
         """True while bytes that are not for this node may still matter to it."""
-        return self._receiver.open or self._unseen_nul > 0
+        return self._receiver.open or self._waits_for is not None
 
     def hear(self, heard: Heard) -> None:
         """Bytes have arrived."""
         data = heard.data
-        if self._unseen_nul:
-            self._put_off(heard)
+        if self._waits_for is not None:
+            self._put_off(heard, *self._waits_for)
         start = heard.begun_before(self._deaf_until) if self._deaf_until > heard.start else 0
         receive = self._receiver.receive
         while (found := receive(data, start)) is not None:
@@ -143,7 +142,7 @@ class NetworkPort:
                 return None
             data = self._answer
             self._answer = None
-            self._unseen_nul = 0
+            self._waits_for = None
         elif self._outbox and max(self._outbox[0][0], self._sent_until) <= now:
             data = self._outbox.popleft()[1]
         else:
@@ -159,50 +158,66 @@ class NetworkPort:
 
     def _packet(self, packet: Packet, heard: Heard, index: int) -> None:
         """A verdict has fallen at byte ``index - 1`` of what was heard."""
-        dest = packet.dest
         size = len(packet.body)
         wrong = packet.verdict is Verdict.WRONG
         triggered = heard.ends(index - 1)
+        general = packet.dest == GENERAL_CALL
         self.packets += 1
-        answered = dest != GENERAL_CALL and self.ack
+        if general and wrong:
+            self._tell(ReportKind.LOST, "broadcast with a wrong CRC")
+            return
+        # The NUL after the trigger byte delays what the device does next. While it makes a NAK it
+        # goes on receiving, so that all bytes do up to the next STX (both as recorded).
+        limit = -1 if wrong else 1
+        run = 0
+        if not self._robust:
+            run = _run(heard.data[index:] + heard.following, limit)
+        replies = heard.ends(index - 1 + run)
+        if self._turnaround:
+            # With the robust receiver the NUL itself completed the packet.
+            replies += turnaround(size, nul_follows=run > 0 or self._robust)
+        answered = self.ack and not general
         if answered:
-            nul_follows = index < len(heard.data) or heard.followed
             if wrong:
                 self.naks += 1
                 self._answer = nak(packet.src, self.address)
             else:
                 self.acks += 1
                 self._answer = ack(packet.src, self.address)
-            self._answer_at = self._answer_time(triggered, size, nul_follows)
-            self._unseen_nul = 0 if nul_follows or self._robust else size + 1
+            self._answer_at = replies
+            if self._turnaround and not self._robust and (wrong or not run):
+                self._waits_for = (limit, size)
         if wrong:
-            if dest == GENERAL_CALL:
-                self._tell(ReportKind.LOST, "broadcast with a wrong CRC")
             return
+        if not answered:
+            # Nothing to answer, but what it is told to send on takes as long to come.
+            self._sent_until = max(self._sent_until, replies)
         if self._deaf:
+            handled = heard.ends(index - 1 + run)
             if answered:
-                handled = self._answer_at + self._rate.span(ANSWER_BYTES)
-            else:
-                handled = heard.ends(index) if heard.followed else triggered
+                handled = replies + self._rate.span(ANSWER_BYTES)
             self._deaf_until = handled + deaf_time(size, answered=answered)
-        self._accept(packet.body, packet.src, dest, triggered)
+        self._accept(packet.body, packet.src, packet.dest, triggered)
 
-    def _answer_time(self, triggered: Ns, size: int, nul_follows: bool) -> Ns:
-        """When the answer to a packet that was complete at ``triggered`` begins."""
-        if self._robust:
-            nul_follows = True  # the NUL itself completed the packet
-        elif nul_follows:
-            triggered += self._rate.span(1)
-        if not self._turnaround:
-            return triggered
-        return triggered + turnaround(size, nul_follows=nul_follows)
-
-    def _put_off(self, heard: Heard) -> None:
-        """The NUL comes after a pause: if it is through before the answer, that counts from it."""
-        size = self._unseen_nul - 1
-        self._unseen_nul = 0
-        if self._answer is not None and heard.ends(0) <= self._answer_at and self._turnaround:
-            was = self._answer_at
-            self._answer_at = heard.ends(0) + turnaround(size, nul_follows=True)
-            if self._deaf_until:
+    def _put_off(self, heard: Heard, limit: int, size: int) -> None:
+        """Bytes come before the answer has begun: it counts from their end instead."""
+        bytes_come = heard.data + heard.following
+        run = _run(bytes_come, limit)
+        if not run or heard.ends(0) > self._answer_at:
+            self._waits_for = None
+            return
+        was = self._answer_at
+        self._answer_at = heard.ends(run - 1) + turnaround(size, nul_follows=True)
+        if limit > 0:
+            self._waits_for = None
+            if self._deaf:
                 self._deaf_until += self._answer_at - was
+        elif run < len(bytes_come):
+            self._waits_for = None
+
+
+def _run(data: bytes, limit: int) -> int:
+    """How many bytes of ``data`` put an answer off: up to the next STX, ``limit`` at most if > 0."""
+    stx = data.find(STX)
+    run = len(data) if stx < 0 else stx
+    return min(run, limit) if limit > 0 else run

@@ -15,7 +15,7 @@ from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
 from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
-from sacbus.language import Motion, Session, describe_motion
+from sacbus.language import Motion, Move, Session
 from sacbus.node import Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
@@ -97,8 +97,8 @@ class SacNode:
             position_steps=pulses / 2**self._memory.ustep,
             position_pulses=pulses,
             rpm=engine.rpm(now),
-            current="" if current is None else describe_motion(current),
-            pending=tuple(map(describe_motion, pending)),
+            current="" if current is None else _short(current),
+            pending=tuple(map(_short, pending)),
             counters={"packets": network.packets, "ack": network.acks, "nak": network.naks},
         )
 
@@ -132,3 +132,16 @@ class SacNode:
     def _tell_line(self, kind: ReportKind, text: str, line: str, column: int) -> None:
         self._tell_bus(Report(self._now, self.address, kind, text, line, column))
 
+
+
+def _short(motion: Motion) -> str:
+    """A resolved command in the manual's shortest form, with all that shapes its profile."""
+    return Move(
+        steps=motion.steps,
+        opposite=not motion.cw,
+        cycle_us=motion.cycle_us,
+        acc100=motion.acc100,
+        dec100=motion.dec100,
+        linear=motion.linear or None,
+        pulses=motion.pulses or None,
+    ).text()

@@ -115,9 +115,11 @@ class _Routes:
         self._open: dict[_Seat, None] = {}
         self.transmit: Callable[[Node, bytes], None]
 
-    @property
-    def standing_open(self) -> bool:
-        return bool(self._open)
+    def concerns(self, data: bytes) -> bool:
+        if self._open:
+            return True
+        addresses = self._addressed(data)
+        return addresses is None or bool(addresses)
 
     def add(self, node: Node) -> None:
         seat = _Seat(node, len(self.seats))

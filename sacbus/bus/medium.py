@@ -50,9 +50,8 @@ class Router(Contract):
         """Hand some bytes to the nodes that they concern."""
         ...
 
-    @property
-    def standing_open(self) -> bool:
-        """True when some node's receiver stands open, whoever the next bytes are for."""
+    def concerns(self, data: bytes) -> bool:
+        """Whether any node would be handed this if it arrived next."""
         ...
 
 
@@ -208,7 +207,7 @@ class Medium:
                 sent.start,
                 heard_by_nodes,
                 self.rate,
-                upto < size,
+                sent.data[upto:],
             )
             self._router.deliver(heard, sent.sender, now)
         if for_listeners:
@@ -218,23 +217,23 @@ class Medium:
                     sent.start,
                     heard_by_listeners,
                     self.rate,
-                    upto < size,
+                    sent.data[upto:],
                 )
             heard_by_listeners = upto
             for owner, listener in tuple(place.listeners):
                 if owner is not sent.sender:
                     listener.hear(heard, now)
         if upto < size:
-            if self._matters(place, sent) or step + 1 < len(cuts):
+            if self._matters(place, sent, upto) or step + 1 < len(cuts):
                 self._await(place, sent, cuts, step + 1, upto, heard_by_listeners)
         else:
             for watcher in self.watchers:
                 watcher(sent)
 
-    def _matters(self, place: _Lane, sent: Transmission) -> bool:
+    def _matters(self, place: _Lane, sent: Transmission, upto: int) -> bool:
         """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""
         return (
             bool(self.watchers)
-            or self._router.standing_open
+            or self._router.concerns(sent.data[upto:])
             or any(owner is not sent.sender for owner, _ in place.listeners)
         )
