@@ -111,7 +111,7 @@ class DeviceReceiver:
         # A destination that was accepted stays so, even if the address has changed since.
         accepted = len(held) > 1
         found = _events_at(held[1]).match(stream) if accepted else None
-        found = found or self._search(stream, int(accepted))
+        found = found or self._search(stream)
         if found is not None:
             return _event(found), start + found.end() - len(held)
         last = stream.rfind(STX)
@@ -132,9 +132,10 @@ def _event(found: re.Match[bytes]) -> Heard:
     """What a device makes of a stretch that came to its end."""
     kind = found.lastindex
     if kind == 3:
-        addresses, body, check = found.group(1, 2, 3)
-        dest, src = addresses
-        if b"\x00" in body:  # its text is a C string: CRC and text end there
+        dest, src = found[1]
+        body = found[2]
+        check = found[3][0]
+        if NUL in body:  # its text is a C string: CRC and text end there
             body = body[: body.index(NUL)]
     elif kind == 4:
         dest, src = found[1]
@@ -142,9 +143,10 @@ def _event(found: re.Match[bytes]) -> Heard:
             return Answer(dest, src, accepted=True)
         return LineFault(Fault.TOO_LONG, found[0])
     else:
-        dest, src, check = found[5][0], found[6][0], found[7]
+        dest, src, check = found[5][0], found[6][0], found[7][0]
         body = b""
-    if check == b"\x00":  # also when 00 is the CRC: a device cannot tell, and does not look
+    if check == NUL:  # also when 00 is the CRC: a device cannot tell, and does not look
         return Packet(dest, src, body, _UNCHECKED)
-    right = check[0] == table_crc(body, 0, CRC_TABLE)
-    return Packet(dest, src, body, _RIGHT if right else _WRONG)
+    if check == table_crc(body, 0, CRC_TABLE):
+        return Packet(dest, src, body, _RIGHT)
+    return Packet(dest, src, body, _WRONG)

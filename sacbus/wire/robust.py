@@ -48,13 +48,14 @@ from sacbus.wire.packets import (
 )
 
 _TOKENS: Final = re.compile(
-    # a clean frame: its addresses, its body, its CRC if it has one. A CRC of 00 or 02 could be
-    # something else; 249 is the longest body that fits a frame of MAX_FRAME bytes with its CRC.
-    rb"\x02([^\x02]{2})(?:((?![\x06\x15])[^\x02\x03]{0,249}+)\x03([^\x00\x02]?)\x00"
+    # a clean frame: its addresses, its body, and its CRC if it has one; 249 is the longest body
+    # that fits a frame of MAX_FRAME bytes with its CRC
+    rb"\x02([^\x02]{2})(?:((?![\x06\x15])[^\x02\x03]{0,249}+)\x03(.?)\x00"
     # or an answer with another frame right behind it
     rb"|([\x06\x15])(?=\x02))"
     # or all that comes before the next STX
-    rb"|(\x02[^\x02]*|[^\x02]+)"
+    rb"|(\x02[^\x02]*|[^\x02]+)",
+    re.DOTALL,
 ).findall
 
 _Endings = tuple[bytes, ...]

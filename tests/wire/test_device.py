@@ -329,10 +329,21 @@ def test_reading_from_the_middle_is_reading_the_rest(
     case: tuple[int, list[bytes]], start: int
 ) -> None:
     address, chunks = case
-    data = b"".join(chunks)
-    found = DeviceReceiver(address).receive(data, start)
-    rest = DeviceReceiver(address).receive(data[start:])
+    *before, data = chunks
+    receivers = [DeviceReceiver(address), DeviceReceiver(address)]
+    for receiver in receivers:
+        heard(receiver, *before)
+    found = receivers[0].receive(data, start)
+    rest = receivers[1].receive(data[start:])
     assert found == (rest and (rest[0], rest[1] + start))
+
+
+def test_the_index_counts_from_the_data_and_not_from_what_was_held() -> None:
+    packet = encode(OWN, 1, b"m1")
+    receiver = DeviceReceiver(OWN)
+    assert receiver.receive(packet[:4]) is None
+    found = receiver.receive(b"deaf" + packet[4:], len(b"deaf"))
+    assert found == (Packet(OWN, 1, b"m1", Verdict.RIGHT), 4 + len(packet) - 5)
 
 
 def test_endless_etx_does_not_grow_the_receiver() -> None:

@@ -70,6 +70,16 @@ CASES: dict[str, tuple[bytes, list[Heard], bytes]] = {
         [right(b"m13"), HEARD_M7],
         b"",
     ),
+    "CRC 00 without its NUL, and a NUL that is not its own": (
+        frame(b"m13", b"\3\0") + M7 + b"\0" + M7,
+        [right(b"m13"), HEARD_M7, noise(b"\0"), HEARD_M7],
+        b"",
+    ),
+    "ACK, a packet, and an ending that is not the ACK's": (
+        ack(1, 82) + M7 + b"\3\0" + M7,
+        [ACCEPTED, HEARD_M7, noise(b"\3\0"), HEARD_M7],
+        b"",
+    ),
     "CRC 00 and two NULs behind it": (
         frame(b"m13", b"\3\0\0\0") + M7,
         [right(b"m13"), noise(b"\0"), HEARD_M7],
@@ -213,8 +223,8 @@ CASES: dict[str, tuple[bytes, list[Heard], bytes]] = {
     "the longest frame": (encode(82, 1, BODY_249), [right(BODY_249)], b""),
     "a body of 250 without CRC": (frame(b"x" * 250, b"\3\0"), [unchecked(b"x" * 250)], b""),
     "a body of 250 with CRC": (
-        frame(b"x" * 250, b"\3\x99\0"),
-        [LineFault(Fault.TOO_LONG, frame(b"x" * 250, b"\3\x99"))],
+        encode(82, 1, b"x" * 250),
+        [LineFault(Fault.TOO_LONG, encode(82, 1, b"x" * 250)[:255])],
         b"\0",
     ),
     "a body of 251": (

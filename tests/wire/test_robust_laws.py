@@ -237,7 +237,7 @@ good_bodies = st.binary(max_size=46).map(
 )
 
 
-@given(st.lists(st.tuples(good_addresses, good_addresses, good_bodies, st.booleans())))
+@given(st.lists(st.tuples(good_addresses, good_addresses, good_bodies, st.booleans()), max_size=5))
 def test_packets_sent_back_to_back_are_heard(
     sent: list[tuple[int, int, bytes, bool]],
 ) -> None:
