@@ -1,0 +1,12 @@
+"""Motion: from a command to the exact time of every pulse.
+
+Owns profiles and everything that is counted in ticks (0.5 us of a node's own oscillator). Imports
+only the command types of `language`, and numpy; no asyncio, no clock, no bytes.
+"""
+
+from sacbus.motion.drive import Drive, Rpm
+from sacbus.motion.legs import State
+from sacbus.motion.planner import plan
+from sacbus.motion.profile import Profile
+
+__all__ = ["Drive", "Profile", "Rpm", "State", "plan"]

@@ -1,0 +1,94 @@
+"""What a node is wired to: the settings that turn a command into pulse periods.
+
+Owns the units of this room and the real period of a pulse. Imports nothing of the project.
+
+Units. *Ticks* are 0.5 us of the node's own oscillator, always integers. *Speed* is an integer in
+hundredths of an RPM times the pulses of a full step, so that a harmonic ramp rises by exactly
+acc x 100 a pulse at every microstep setting, and a pulse at speed w lasts `rate // w` ticks.
+Source: manual, "Slow speed", "Micro-stepping", "ihd", "xclk"; spec, "Units and clock".
+"""
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Final
+
+TICKS_PER_US: Final = 2
+"""The timer runs at 2 MHz (manual, "Slow speed")."""
+
+TICKS_PER_MINUTE: Final = 60_000_000 * TICKS_PER_US
+
+NO_RAMP: Final = 99_900
+"""acc or dec of 999, in hundredths: go straight to the speed (manual, "Accel")."""
+
+SERVICE_TICKS: Final = 8
+"""Overhead of the pulse interrupt, which the factory ihd of 8 cancels exactly (decision)."""
+
+FACTORY_SPRF: Final = 200
+USTEP_MAX: Final = 7
+
+Rpm = int | Fraction
+"""Whole RPM as commanded; a Fraction where a ramp was cut into between two of them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Motor, driver and timing settings of one node; everything motion needs besides the command.
+
+    sprf: full steps a revolution; 0 acts as the factory's 200. slow_rpm: start and stop speed;
+    0 acts as 1. ustep: exponent 0-7, 2**ustep pulses a full step. ihd and xclk: ticks taken from
+    and added to every period. pulse_us: width of clk. pull_in_rpm: the speed up to which the
+    motor starts from rest, None when unknown; it serves warnings only.
+    ValueError for what no device can hold.
+    """
+
+    sprf: int = FACTORY_SPRF
+    slow_rpm: int = 10
+    ustep: int = 0
+    ihd: int = 8
+    xclk: int = 0
+    pulse_us: int = 1
+    pull_in_rpm: int | None = None
+    # Derived once, because plan() reads them for every command.
+    steps_per_rev: int = field(init=False, repr=False, compare=False)
+    slow: int = field(init=False, repr=False, compare=False)
+    m: int = field(init=False, repr=False, compare=False)
+    rate: int = field(init=False, repr=False, compare=False)
+    slow_speed: int = field(init=False, repr=False, compare=False)
+    offset: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.ustep <= USTEP_MAX:
+            raise ValueError(f"ustep is an exponent of 0 to {USTEP_MAX}, got {self.ustep}")
+        for name in ("sprf", "slow_rpm", "ihd", "xclk", "pulse_us"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} is never negative, got {getattr(self, name)}")
+        derive = object.__setattr__
+        derive(self, "steps_per_rev", self.sprf or FACTORY_SPRF)
+        derive(self, "slow", self.slow_rpm or 1)
+        derive(self, "m", 1 << self.ustep)
+        derive(self, "rate", TICKS_PER_MINUTE * 100 // self.steps_per_rev)
+        derive(self, "slow_speed", self.speed(self.slow))
+        derive(self, "offset", self.xclk - self.ihd + SERVICE_TICKS)
+
+    def speed(self, rpm: Rpm) -> int:
+        """An RPM in this room's integer unit; what does not fit the unit is cut off."""
+        return int(rpm * 100 * self.m)
+
+    def rpm(self, speed: int) -> Rpm:
+        """The exact RPM of a speed: an int where it is whole, else a Fraction."""
+        exact = Fraction(speed, 100 * self.m)
+        return exact.numerator if exact.denominator == 1 else exact
+
+    def real_period(self, nominal: int) -> int:
+        """Ticks a pulse of this nominal period really lasts, at least 1."""
+        period = nominal + self.offset
+        return max(1, period)
+
+    def cruise_period(self, cycle_us: int) -> int:
+        """Real ticks of a pulse when a full step lasts cycle_us; truncated, as the device does."""
+        period = (cycle_us * TICKS_PER_US >> self.ustep) + self.offset
+        return max(1, period)
+
+    def real_rpm(self, period: int) -> float:
+        """RPM at which the motor turns when every pulse lasts `period` real ticks."""
+        return TICKS_PER_MINUTE / (self.steps_per_rev * self.m * period)

@@ -1,0 +1,114 @@
+"""The room agrees with the slow reference, pulse for pulse, cuts included."""
+
+from __future__ import annotations
+
+from collections import Counter
+from fractions import Fraction
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from sacbus.language import Motion
+from sacbus.motion import Profile, plan
+from tests.motion.reference import Run, Setup, run
+from tests.motion.strategies import accelerations, drive_of, motions, setups
+
+END = 1 << 60
+LENGTH = 3_000
+"""Ramps beyond this are for the tests of the tables: the reference would take seconds."""
+
+
+def walk(setup: Setup, rpm: int, acc100: int, linear: bool) -> int:
+    """Pulses of a ramp from standstill."""
+    steps = setup.steps_to(Fraction(rpm), acc100) if linear else rpm * 100 // acc100
+    return steps * setup.m
+
+
+def assume_walkable(setup: Setup, *motions: Motion, start: int = 0) -> None:
+    for motion in motions:
+        top = max(motion.rpm, start)
+        assume(walk(setup, top, motion.acc100, motion.linear) < LENGTH)
+        assume(walk(setup, top, motion.dec100, motion.linear) < LENGTH)
+
+
+def assert_agree(profile: Profile, reference: Run) -> None:
+    times = reference.times
+    assert profile.pulse_times(0, END).tolist() == times
+    assert profile.pulses == len(times)
+    assert profile.duration == reference.duration
+    states = Counter(pulse.state for pulse in reference.pulses)
+    unit = profile.shares.unit
+    assert profile.n_acc * unit == states["ACCEL"]
+    assert profile.n_dec * unit == states["DECEL"]
+    for k in {0, 1, len(times) // 3, len(times) - 1} & set(range(len(times))):
+        pulse = reference.pulses[k]
+        assert profile.time_of(k) == times[k]
+        assert profile.pulses_at(times[k]) == k + 1
+        assert profile.pulses_at(times[k] - 1) == k
+        if times[k] < reference.duration:
+            assert profile.state_at(times[k]).name == pulse.state
+            assert profile.course.place_of(k).pace.speed == int(pulse.rpm * 100 * profile.drive.m)
+
+
+@settings(max_examples=300)
+@given(data=st.data(), setup=setups, start=st.sampled_from([0, 0, 5, 50, 100, 333]))
+def test_a_command_issues_the_pulses_of_the_reference(
+    data: st.DataObject, setup: Setup, start: int
+) -> None:
+    motion = data.draw(motions(setup.sprf))
+    assume_walkable(setup, motion, start=start)
+    assert_agree(plan(motion, drive_of(setup), start), run(motion, setup, start))
+
+
+@settings(max_examples=300)
+@given(data=st.data(), setup=setups, start=st.sampled_from([0, 0, 80]))
+def test_every_cut_leaves_the_pulses_of_the_reference(
+    data: st.DataObject, setup: Setup, start: int
+) -> None:
+    motion = data.draw(motions(setup.sprf))
+    dec100 = data.draw(accelerations)
+    linear = data.draw(st.booleans())
+    assume_walkable(setup, motion, start=start)
+    assume(walk(setup, max(motion.rpm, start), dec100, linear) < LENGTH)
+    profile, reference = plan(motion, drive_of(setup), start), run(motion, setup, start)
+    at = data.draw(st.integers(0, reference.duration + 10), label="cut at")
+    assert_agree(profile.halt(at), reference.halt(at))
+    assert_agree(profile.cut(at), reference.cut(at))
+    once = profile.slow_down(at, dec100, linear=linear)
+    expected = reference.slow_down(at, dec100, linear)
+    assert_agree(once, expected)
+    again = data.draw(st.integers(0, expected.duration + 10), label="cut again at")
+    assert_agree(once.halt(again), expected.halt(again))
+
+
+@settings(max_examples=200)
+@given(data=st.data(), setup=setups)
+def test_continuous_motion_changes_speed_and_stops_as_the_reference(
+    data: st.DataObject, setup: Setup
+) -> None:
+    motion = data.draw(motions(setup.sprf, continuous=True))
+    faster = data.draw(motions(setup.sprf, continuous=True))
+    dec100 = data.draw(accelerations)
+    linear = data.draw(st.booleans())
+    assume_walkable(setup, motion, faster)
+    assume(walk(setup, max(motion.rpm, faster.rpm), dec100, linear) < LENGTH)
+    drive, cruise = drive_of(setup), 50
+    profile, reference = plan(motion, drive), run(motion, setup, cruise=cruise)
+    assert (profile.pulses, profile.n_cruise, profile.duration) == (None, None, None)
+    seen = reference.duration
+    assert profile.pulse_times(0, seen).tolist() == reference.times
+    assert profile.kept_rpm == 0
+
+    at = data.draw(st.integers(0, seen - 1), label="new velocity at")
+    profile, reference = profile.retarget(at, faster), reference.retarget(at, faster, cruise)
+    seen = reference.duration
+    assert profile.pulse_times(0, seen).tolist() == reference.times
+
+    at = data.draw(st.integers(0, reference.times[-1] - 1), label="slow down at")
+    profile, reference = (
+        profile.slow_down(at, dec100, linear=linear),
+        reference.slow_down(at, dec100, linear),
+    )
+    assert_agree(profile, reference)
+    at = data.draw(st.integers(0, reference.duration), label="cut at")
+    assert_agree(profile.cut(at), reference.cut(at))
