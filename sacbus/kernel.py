@@ -13,7 +13,7 @@ time it is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from typing import Any, Final
 
@@ -33,9 +33,17 @@ class LineRate:
 
     baud: int = 38_400
     bits: int = 10
+    #: The spans of short runs: every packet asks for several.
+    _short: tuple[Ns, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        spans = tuple(count * self.bits * SECOND // self.baud for count in range(64))
+        object.__setattr__(self, "_short", spans)
 
     def span(self, count: int) -> Ns:
         """Line time of ``count`` bytes in a row, ns, truncated once for all of them together."""
+        if count < 64:
+            return self._short[count]
         return count * self.bits * SECOND // self.baud
 
     def bytes_begun(self, elapsed: Ns) -> int:

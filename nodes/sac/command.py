@@ -147,7 +147,7 @@ class CommandProcessor:
         """Do what a command says, at ``now``."""
         match command:
             case Move():
-                self._move(command, now)
+                self.move(command, now)
             case Velocity():
                 self.session = self.session.with_velocity(command)
                 self._retarget(now)
@@ -169,7 +169,8 @@ class CommandProcessor:
             case _:
                 assert_never(command)
 
-    def _move(self, move: Move, now: Ns) -> None:
+    def move(self, move: Move, now: Ns) -> None:
+        """M: the next queue position, or continuous motion at once."""
         motion, self.session = self.session.resolve(move)
         if motion.steps is None:
             self._preempt(motion, now)
@@ -242,9 +243,10 @@ class CommandProcessor:
         profile = self._engine.profile
         if profile is None:
             return
-        self._kept_rpm = 0 if self._stopping else profile.kept_rpm
-        self._last_end = end
-        self._last_period = profile.last_period
+        kept = self._kept_rpm = 0 if self._stopping else profile.kept_rpm
+        if kept:
+            self._last_end = end
+            self._last_period = profile.last_period
         self._stopping = False
         self._current = None
         self._engine.finish()

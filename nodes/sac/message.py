@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from nodes.sac.command import CommandProcessor
 from sacbus.kernel import Ns
-from sacbus.language import Empty, Forward, Message, SoftOp, parse
+from sacbus.language import Empty, Forward, Message, Move, Parsed, SoftOp, parse
 from sacbus.node import ReportKind
 from sacbus.wire import GENERAL_CALL
 
@@ -49,14 +49,12 @@ class MessageProcessor:
             self._last_source = source
         parsed = parse(body)
         command = parsed.command
-        for remark in parsed.remarks:
-            self._tell(
-                ReportKind.REFUSED if command is None else ReportKind.WARNING,
-                remark.text,
-                self.line,
-                remark.column,
-            )
+        if parsed.remarks:
+            self._tell_remarks(parsed)
         match command:
+            case Move():
+                # First, and apart, because nearly all lines are this.
+                self._commands.move(command, now)
             case None | Empty() | SoftOp():
                 pass
             case Forward(onward, rest):
@@ -70,3 +68,8 @@ class MessageProcessor:
             case _:
                 self._commands.execute(command, now)
         self._line = b""
+
+    def _tell_remarks(self, parsed: Parsed) -> None:
+        kind = ReportKind.REFUSED if parsed.command is None else ReportKind.WARNING
+        for remark in parsed.remarks:
+            self._tell(kind, remark.text, self.line, remark.column)

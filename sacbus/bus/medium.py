@@ -122,118 +122,90 @@ class Medium:
 
     def listen(self, lane: int, listener: Listener, owner: object) -> None:
         """Have ``listener`` hear a lane; what ``owner`` itself sends there is left out."""
-        self._lanes[lane].listeners.append((owner, listener))
+        place = self._lanes[lane]
+        place.listeners = [*place.listeners, (owner, listener)]
 
     def unlisten(self, lane: int, listener: Listener) -> None:
         """Forget a listener; nothing happens if it was not there."""
-        entries = self._lanes[lane].listeners
-        entries[:] = [entry for entry in entries if entry[1] is not listener]
+        # A new list: the old one may be being walked through.
+        place = self._lanes[lane]
+        place.listeners = [entry for entry in place.listeners if entry[1] is not listener]
 
     def transmit(self, sender: object, data: bytes, lane: int) -> Transmission:
         """Begin to send ``data`` (not empty) now. Nobody is kept from talking over another."""
         kernel = self.kernel
         now = kernel.now
         place = self._lanes[lane]
-        span = self.rate.span(len(data))
-        sent = Transmission(sender, now, data, self.rate, now + span)
+        size = len(data)
+        span = self.rate.span(size)
+        cuts = self._router.cuts(data) if lane == 0 else ()
+        end = now + span
+        sent = Transmission(sender, lane, now, data, self.rate, end, cuts)
         counters = place.counters
         counters.transmissions += 1
-        counters.bytes += len(data)
+        counters.bytes += size
         counters.busy += span
-        if place.free_at is not None and place.free_at > now:
+        free_at = place.free_at
+        if free_at is not None and free_at > now:
             self._collide(place, sent)
-            place.active.append(sent)
-            place.free_at = max(place.free_at, sent.end)
+            if end < free_at:
+                end = free_at
         else:
-            place.active = [sent]
-            place.free_at = sent.end
-        cuts = self._router.cuts(data) if lane == 0 else ()
-        self._await(place, sent, cuts, 0, 0, 0)
+            place.active.clear()
+        place.active.append(sent)
+        place.free_at = end
+        kernel.at(now + self.rate.span(cuts[0]) if cuts else sent.end, self._arrive, sent)
         return sent
 
     def _collide(self, place: _Lane, sent: Transmission) -> None:
-        for other in place.active:
-            if other.end <= sent.start:
-                continue
-            hit = (sent.start, min(sent.end, other.end))
-            for one in (other, sent):
-                if not one.hits:
-                    place.counters.collided += 1
-                one.hits.append(hit)
+        """``sent`` begins while others are on their way: what overlaps is spoilt in both."""
         place.active = [other for other in place.active if other.end > sent.start]
+        for other in place.active:
+            end = min(sent.end, other.end)
+            for one in (other, sent):
+                place.counters.collided += one.hit(sent.start, end)
 
-    def _await(
-        self,
-        place: _Lane,
-        sent: Transmission,
-        cuts: list[int] | tuple[int, ...],
-        step: int,
-        heard_by_nodes: int,
-        heard_by_listeners: int,
-    ) -> None:
-        """Make the appointment for the next instant at which somebody hears some of ``sent``."""
-        upto = cuts[step] if step < len(cuts) else len(sent.data)
-        self.kernel.at(
-            sent.start + self.rate.span(upto),
-            self._arrive,
-            place,
-            sent,
-            cuts,
-            step,
-            upto,
-            heard_by_nodes,
-            heard_by_listeners,
-        )
-
-    def _arrive(
-        self,
-        place: _Lane,
-        sent: Transmission,
-        cuts: list[int] | tuple[int, ...],
-        step: int,
-        upto: int,
-        heard_by_nodes: int,
-        heard_by_listeners: int,
-    ) -> None:
+    def _arrive(self, sent: Transmission) -> None:
+        """Some of a transmission has arrived: up to its next cut, or all of it."""
         now = self.kernel.now
-        size = len(sent.data)
+        data = sent.data
+        cuts = sent.cuts
+        step = sent.step
+        size = upto = len(data)
+        if step < len(cuts):
+            upto = cuts[step]
+        place = self._lanes[sent.lane]
+        heard = None
+        if sent.lane == 0:
+            heard = self._heard(sent, sent.to_nodes, upto)
+            self._router.deliver(heard, sent.sender, now)
         # Listeners hear whole frames: all cuts but the last, and the end. (What follows the last
         # cut of a single packet is its NUL; to hear that apart would only cost them.)
-        for_listeners = bool(place.listeners) and (upto == size or step < len(cuts) - 1)
-        heard = None
-        if place is self._lanes[0]:
-            heard = Heard(
-                sent.arrived(heard_by_nodes, upto, self._noise),
-                sent.start,
-                heard_by_nodes,
-                self.rate,
-                sent.data[upto:],
-            )
-            self._router.deliver(heard, sent.sender, now)
-        if for_listeners:
-            if heard is None or heard_by_listeners != heard_by_nodes:
-                heard = Heard(
-                    sent.arrived(heard_by_listeners, upto, self._noise),
-                    sent.start,
-                    heard_by_listeners,
-                    self.rate,
-                    sent.data[upto:],
-                )
-            heard_by_listeners = upto
-            for owner, listener in tuple(place.listeners):
+        if place.listeners and (upto == size or step < len(cuts) - 1):
+            if heard is None or sent.to_listeners != sent.to_nodes:
+                heard = self._heard(sent, sent.to_listeners, upto)
+            sent.to_listeners = upto
+            for owner, listener in place.listeners:
                 if owner is not sent.sender:
                     listener.hear(heard, now)
-        if upto < size:
-            if self._matters(place, sent, upto) or step + 1 < len(cuts):
-                self._await(place, sent, cuts, step + 1, upto, heard_by_listeners)
-        else:
+        if upto == size:
             for watcher in self.watchers:
                 watcher(sent)
+            return
+        sent.to_nodes = upto
+        sent.step = step = step + 1
+        if step < len(cuts):
+            self.kernel.at(sent.start + self.rate.span(cuts[step]), self._arrive, sent)
+        elif self._rest_matters(place, sent, upto):
+            self.kernel.at(sent.end, self._arrive, sent)
 
-    def _matters(self, place: _Lane, sent: Transmission, upto: int) -> bool:
-        """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""
-        return (
-            bool(self.watchers)
-            or self._router.concerns(sent.data[upto:])
-            or any(owner is not sent.sender for owner, _ in place.listeners)
+    def _heard(self, sent: Transmission, first: int, last: int) -> Heard:
+        return Heard(
+            sent.arrived(first, last, self._noise), sent.start, first, self.rate, sent.data[last:]
         )
+
+    def _rest_matters(self, place: _Lane, sent: Transmission, upto: int) -> bool:
+        """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""
+        if self.watchers or self._router.concerns(sent.data[upto:]):
+            return True
+        return any(owner is not sent.sender for owner, _ in place.listeners)

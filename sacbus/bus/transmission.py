@@ -5,7 +5,7 @@ Owns the bytes on the wire and which of them were hit when transmissions overlap
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from random import Random
 
 from sacbus.kernel import LineRate, Ns
@@ -13,23 +13,68 @@ from sacbus.kernel import LineRate, Ns
 __all__ = ["Transmission"]
 
 
-@dataclass(slots=True, eq=False)
 class Transmission:
     """Bytes sent in one go, without a pause, from ``start`` to ``end`` (ns) by ``sender``.
 
     ``data`` is what the sender sent. What arrives is :meth:`arrived`; the two differ where another
-    transmission overlapped (``hits``: from-to pairs in ns).
+    transmission overlapped (``hits``: from-to pairs in ns). ``cuts`` are the offsets at which nodes
+    hear it, ``step`` how many of them have passed, ``to_nodes`` and ``to_listeners`` how many bytes
+    each have heard.
     """
 
-    sender: object
-    start: Ns
-    data: bytes
-    rate: LineRate
-    end: Ns
-    hits: list[tuple[Ns, Ns]] = field(default_factory=list)
-    #: Bytes of ``data`` whose fate is settled, and what arrived of them when hits touched them.
-    _wire: bytearray | None = None
-    _settled: int = 0
+    __slots__ = (
+        "_settled",
+        "_wire",
+        "cuts",
+        "data",
+        "end",
+        "hits",
+        "lane",
+        "rate",
+        "sender",
+        "start",
+        "step",
+        "to_listeners",
+        "to_nodes",
+    )
+
+    def __init__(
+        self,
+        sender: object,
+        lane: int,
+        start: Ns,
+        data: bytes,
+        rate: LineRate,
+        end: Ns,
+        cuts: Sequence[int],
+    ) -> None:
+        self.sender = sender
+        self.lane = lane
+        self.start = start
+        self.data = data
+        self.rate = rate
+        self.end = end
+        self.cuts = cuts
+        self.step = 0
+        self.to_nodes = 0
+        self.to_listeners = 0
+        self.hits: list[tuple[Ns, Ns]] | None = None
+        #: What arrived, once hits have touched it, and how many bytes of that are settled.
+        self._wire: bytearray | None = None
+        self._settled = 0
+
+    @property
+    def collided(self) -> bool:
+        """True once another transmission has overlapped this one."""
+        return self.hits is not None
+
+    def hit(self, begin: Ns, end: Ns) -> bool:
+        """Another transmission overlaps from ``begin`` to ``end``; True the first time."""
+        if self.hits is None:
+            self.hits = [(begin, end)]
+            return True
+        self.hits.append((begin, end))
+        return False
 
     def arrived(self, first: int, last: int, noise: Random) -> bytes:
         """What arrived of bytes ``first`` to ``last`` (exclusive), all of which have ended by now.
@@ -38,21 +83,21 @@ class Transmission:
         once from ``noise``: everyone hears the same. Drivers that fight give no defined level, so
         no rule of combination would be truer than chance.
         """
-        if not self.hits:
-            return self.data if first == 0 and last == len(self.data) else self.data[first:last]
+        if self.hits is None:
+            return self.data[first:last]
         if self._wire is None:
             self._wire = bytearray(self.data)
         if last > self._settled:
-            for index in sorted(self._struck(self._settled, last)):
+            for index in sorted(self._struck(self.hits, self._settled, last)):
                 self._wire[index] ^= noise.randrange(1, 256)
             self._settled = last
         return bytes(self._wire[first:last])
 
-    def _struck(self, first: int, last: int) -> set[int]:
+    def _struck(self, hits: list[tuple[Ns, Ns]], first: int, last: int) -> set[int]:
         """Indices in ``first``..``last`` of the bytes that a hit touches, however briefly."""
         struck: set[int] = set()
-        for begin, end in self.hits:
-            # The first byte that ends after the hit began, and the first that begins after it.
+        for begin, end in hits:
+            # The byte that was on its way as the hit began, and the first that begins after it.
             low = self.rate.bytes_begun(begin - self.start + 1) - 1
             high = self.rate.bytes_begun(end - self.start)
             struck.update(range(max(low, first), min(high, last)))

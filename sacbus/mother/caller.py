@@ -76,7 +76,7 @@ class _Request:
     body: bytes
     data: bytes
     done: Callable[[Acknowledged | Sent | MotherError], None]
-    repeatable: bool
+    accept_duplicates: bool
     attempts: int = 0
     sent_at: Ns = 0
     last: str = "none"
@@ -138,7 +138,7 @@ class Caller:
                 body,
                 encode(node, MOTHER, body),
                 done,
-                accept_duplicates or repeatable(line),
+                accept_duplicates,
             )
         )
 
@@ -237,7 +237,7 @@ class Caller:
         self._overdue = None
         self.statistics[request.node].timeouts += 1
         request.last = "silence"
-        if not request.repeatable:
+        if not (request.accept_duplicates or repeatable(request.body)):
             request.done(self._failure(UnknownOutcome, request))
         elif request.attempts < self._tries:
             self._waiting.appendleft(request)
