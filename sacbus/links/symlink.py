@@ -1,14 +1,14 @@
 """A stable path to a pty: a symlink that one live run owns.
 
 The numbers under /dev/pts are handed out again, so a symlink that a killed run left behind may
-point at somebody's shell. PATH.lock, locked by flock for as long as its run lives, tells the two
-apart: a symlink beside an unlocked PATH.lock is a dead run's and is replaced; every other thing at
-PATH is somebody's and is refused.
+point at somebody's shell. PATH.lock, locked by flock for as long as its run lives and holding its
+number, tells the two apart: a symlink beside an unlocked PATH.lock is a dead run's and is replaced;
+every other thing at PATH is somebody's and is refused.
 
-The lock comes first, then the look at PATH, then the symlink, which appears in one step. Two rules
-keep that free of races: PATH.lock appears already locked (it is linked into place), so nobody
-mistakes a newborn one for a dead run's; and it is unlinked only while locked, so whoever locks it
-must look whether it still has its name.
+The lock comes first, then the look at PATH, then the number, then the symlink, in one step. Going
+down it is the other way round. Two rules keep that free of races: a PATH.lock without a number has
+never guarded anything, so that a newborn one is not mistaken for a dead run's; and it is unlinked
+only while locked, so whoever has locked it must look whether it still bears its name.
 """
 
 from __future__ import annotations
@@ -17,13 +17,10 @@ import contextlib
 import fcntl
 import os
 from pathlib import Path
-from typing import Final
 
 from .errors import LinkError, PathTaken
 
 __all__ = ["Symlink"]
-
-_CHOOSE: Final = "remove it or choose another path"
 
 
 class Symlink:
@@ -31,6 +28,8 @@ class Symlink:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        if not self.path.name:
+            raise LinkError("a directory is in the way", str(self.path), "choose another path")
         self._lock_path = self.path.with_name(self.path.name + ".lock")
         self._beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         self._lock: int | None = None
@@ -44,13 +43,7 @@ class Symlink:
         if self._lock is not None:
             raise LinkError("the path is claimed already", str(self.path), "release it first")
         try:
-            self._take_lock()
-            try:
-                self._refuse_what_is_not_ours()
-                self.point(target)
-            except BaseException:
-                self.release()
-                raise
+            self._lock = self._point_under_lock(target)
         except LinkError:
             raise
         except FileNotFoundError as error:
@@ -59,8 +52,7 @@ class Symlink:
             ) from error
         except OSError as error:
             what = f"cannot make the symlink ({error.strerror})"
-            remedy = "change the directory's permissions or choose another path"
-            raise LinkError(what, str(self.path), remedy) from error
+            raise LinkError(what, str(self.path), "choose another path") from error
 
     def point(self, target: str) -> None:
         """Point the claimed path at `target`, in one step: it is never missing in between."""
@@ -93,64 +85,40 @@ class Symlink:
             self._target = ""
             os.close(lock)
 
-    def _take_lock(self) -> None:
-        """Lock PATH.lock, a dead run's or a new one; whoever loses a round lost it to another."""
-        while self._lock is None:
-            try:
-                self._lock = self._lock_of_a_dead_run()
-            except FileNotFoundError:
-                if os.path.lexists(self.path):
-                    # Before anything is made, so that a refusal leaves no trace.
-                    raise self._not_ours() from None
-                self._lock = self._new_lock()
-
-    def _lock_of_a_dead_run(self) -> int | None:
-        """The lock that stands there, or None when it went away meanwhile."""
-        lock = os.open(self._lock_path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC)
+    def _point_under_lock(self, target: str) -> int:
+        lock = self._take_lock()
+        newborn = os.fstat(lock).st_size == 0
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if _is_named(lock, self._lock_path):
-                os.ftruncate(lock, 0)
-                os.pwrite(lock, b"%d\n" % os.getpid(), 0)
-                return lock
-        except BlockingIOError:
-            owner = os.pread(lock, 20, 0).decode("ascii", "replace").strip() or "?"
-            os.close(lock)
-            what = f"the path is served by process {owner}"
-            raise PathTaken(what, str(self.path), "stop it or choose another path") from None
-        except BaseException:
-            os.close(lock)
-            raise
-        os.close(lock)
-        return None
-
-    def _new_lock(self) -> int | None:
-        """A lock of our own, locked before it has its name; None when somebody was quicker."""
-        unnamed = self._beside.with_name(self._beside.name + ".lock")
-        with contextlib.suppress(
-            FileNotFoundError
-        ):  # of a run with our number that was killed here
-            unnamed.unlink()
-        lock = os.open(unnamed, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.lexists(self.path) and (newborn or not self.path.is_symlink()):
+                raise self._not_ours()
+            os.ftruncate(lock, 0)
             os.pwrite(lock, b"%d\n" % os.getpid(), 0)
-            try:
-                os.link(unnamed, self._lock_path)
-            except FileExistsError:
-                os.close(lock)
-                return None
+            self.point(target)
         except BaseException:
+            if newborn:
+                self._lock_path.unlink()
             os.close(lock)
             raise
-        finally:
-            unnamed.unlink()
         return lock
 
-    def _refuse_what_is_not_ours(self) -> None:
-        """Beside our lock a symlink is a dead run's; anything else was never ours."""
-        if os.path.lexists(self.path) and not self.path.is_symlink():
-            raise self._not_ours()
+    def _take_lock(self) -> int:
+        """PATH.lock, locked, and still of that name."""
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+        while True:  # whoever loses a round has lost it to one who got through
+            lock = os.open(self._lock_path, flags, 0o644)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if _is_named(lock, self._lock_path):
+                    return lock
+            except BlockingIOError:
+                owner = os.pread(lock, 20, 0).decode("ascii", "replace").strip()
+                os.close(lock)
+                what = f"the path is served by process {owner or 'unknown'}"
+                raise PathTaken(what, str(self.path), "stop it or choose another path") from None
+            except BaseException:
+                os.close(lock)
+                raise
+            os.close(lock)
 
     def _not_ours(self) -> PathTaken:
         if self.path.is_symlink():
@@ -159,7 +127,7 @@ class Symlink:
             what = "a directory is in the way"
         else:
             what = "a file is in the way"
-        return PathTaken(what, str(self.path), _CHOOSE)
+        return PathTaken(what, str(self.path), "remove it or choose another path")
 
 
 def _is_named(descriptor: int, path: Path) -> bool:
