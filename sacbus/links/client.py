@@ -2,8 +2,8 @@
 
 Owns opening a LINK as users write it, and pyserial-asyncio, whose known defects end in this file:
 it never reports an adapter that was unplugged while nothing was written (its issues 12 and 28),
-which only a write will then show; and it cannot drive ``socket://`` or ``rfc2217://`` (a later
-version opens those without it).
+which only a write will then show; it hands out a connection before it is made; and it cannot drive
+``socket://`` or ``rfc2217://`` (a later version opens those without it).
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ class Line(asyncio.Protocol):
     def __init__(self, where: str) -> None:
         self._where = where
         self._transport: asyncio.Transport | None = None
+        self.made = asyncio.Event()
         self._hear: Callable[[bytes], None] | None = None
         self._lose: Callable[[str], None] | None = None
         self._closing = False
@@ -54,6 +55,7 @@ class Line(asyncio.Protocol):
         """asyncio's: the port is open."""
         assert isinstance(transport, asyncio.Transport)  # pyserial-asyncio's is one
         self._transport = transport
+        self.made.set()
 
     def data_received(self, data: bytes) -> None:
         """asyncio's: bytes have come. Those before :meth:`start` were for somebody else."""
@@ -92,6 +94,7 @@ async def open_line(link: str, baud: int) -> AsyncIterator[Line]:
             f"cannot open the line ({_reason(fault)})", link, "check the path, and who else has it"
         ) from fault
     try:
+        await line.made.wait()
         yield line
     finally:
         line.close()
