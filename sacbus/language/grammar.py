@@ -169,8 +169,12 @@ def _move(line: Line) -> Command | None:
     """``M``, from its second character to the end."""
     opposite = line.word[1:2] == "-"
     at = 1 + opposite
-    ignored = "it is ignored, so the motion is continuous"
-    steps, at = line.number(at, "the number of steps", BITS_32, ignored)
+    steps, after = line.number(
+        at, "the number of steps", BITS_32, "the command is refused: without steps it never ends"
+    )
+    if steps is None and after > at:
+        return None
+    at = after
     return qualified(line, at, Move(steps, opposite))
 
 
