@@ -190,6 +190,49 @@ async def _send(
     }
 
 
+@root.command("plan", context_settings={"ignore_unknown_options": True})
+@click.argument("commands", nargs=-1, required=True, metavar="COMMAND...")
+@click.option("--ustep", type=click.IntRange(0, 7), default=0, show_default=True,
+              help="Microsteps, as a power of two.")
+@click.option("--sprf", type=click.IntRange(1, 65_535), default=200, show_default=True,
+              help="Full steps per revolution.")
+@click.option("--slow", type=click.IntRange(1, 255), default=10, show_default=True,
+              help="RPM up to which there are no ramps.")
+@click.option("--start-rpm", type=click.IntRange(0), default=0, show_default=True,
+              help="Velocity kept from a command before; 0: from rest.")
+@click.option("--gap/--no-gap", default=True, show_default=True,
+              help="Whether a kept velocity is lost when the next command comes too late.")
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+def plan_command(commands: tuple[str, ...], ustep: int, sprf: int, slow: int, start_rpm: int,
+                 gap: bool, as_json: bool) -> int:
+    """Work out what motion commands do: steps in each state, peak speed, duration, warnings.
+
+    Several commands are planned as a sequence, each as soon as the last has ended. A COMMAND of -
+    reads them from standard input, a line each.
+
+    \b
+    Example: sacbus plan m200v100a1d1
+             sacbus plan m500v100a1d999 m500v100a1d1 --json
+    """
+    from sacbus import plan as planning
+    from sacbus.motion import Drive
+
+    lines: list[str] = []
+    for command in commands:
+        lines += click.get_text_stream("stdin").read().split() if command == "-" else [command]
+    drive = Drive(sprf=sprf, slow_rpm=slow, ustep=ustep)
+    try:
+        planned = planning.plan_sequence(lines, drive, start_rpm=start_rpm, gap=gap)
+    except planning.PlanError as fault:
+        # Caught here, so that no other command waits for numpy to be imported.
+        raise click.ClickException(str(fault)) from fault
+    if as_json:
+        click.echo(json.dumps(planning.as_json(planned)))
+    else:
+        click.echo("\n".join(planning.as_text(planned)))
+    return 0
+
+
 @root.command()
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
 def kinds(as_json: bool) -> int:

@@ -28,7 +28,7 @@ from sacbus.language import (
     Stop,
     Velocity,
 )
-from sacbus.motion import Drive, plan
+from sacbus.motion import Drive, gap_passes, load_ticks, plan
 from sacbus.node import ReportKind
 
 __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand"]
@@ -36,8 +36,6 @@ __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand"]
 #: Positions of the command queue (manual, "Throw-away").
 QUEUE_LENGTH: Final = 30
 
-def load_ticks(changed): return 80 if changed else 32
-def gap_passes(late, period): return late <= period
 #: The commands that end here; a message processor deals with the others itself.
 MotionCommand = (
     Move
@@ -233,7 +231,7 @@ class CommandProcessor:
         profile = plan(motion, self._drive, kept)
         self._current = motion
         self._engine.start(profile, start)
-        for warning in getattr(profile,"warnings",()):
+        for warning in profile.warnings:
             self._tell(ReportKind.WARNING, str(warning))
         if self._soft_ops is not None:
             self._untold = start
