@@ -23,7 +23,7 @@ TICK: Final[Ns] = 500
 class Engine:
     """One motor. Positions in pulses, signed, clockwise positive, from 0 at power up."""
 
-    __slots__ = ("_end", "_profile", "_rest", "_sign", "_started")
+    __slots__ = ("_profile", "_rest", "_sign", "_started", "end")
 
     def __init__(self) -> None:
         #: Position before the present profile's first pulse.
@@ -31,7 +31,8 @@ class Engine:
         self._profile: Profile | None = None
         self._sign = 1
         self._started: Ns = 0
-        self._end: Ns | None = None
+        #: When the present profile's last period runs out; None when it never does, or none runs.
+        self.end: Ns | None = None
 
     @property
     def profile(self) -> Profile | None:
@@ -42,11 +43,6 @@ class Engine:
     def started(self) -> Ns:
         """When the present profile's first pulse is issued; it may be to come."""
         return self._started
-
-    @property
-    def end(self) -> Ns | None:
-        """When the present profile's last period runs out; None when it never does, or none runs."""
-        return self._end
 
     def start(self, profile: Profile, at: Ns) -> None:
         """Run a profile from ``at`` on; the motor must stand or have :meth:`finish`-ed."""
@@ -68,12 +64,12 @@ class Engine:
             # Only continuous motion has no number of pulses, and that has no end to come to.
             self._rest += self._sign * (self._profile.pulses or 0)
         self._profile = None
-        self._end = None
+        self.end = None
 
     def discard(self) -> None:
         """Forget a profile that has not issued a pulse."""
         self._profile = None
-        self._end = None
+        self.end = None
 
     def step(self, pulses: int) -> None:
         """Single pulses, out of any profile; only while the motor stands."""
@@ -102,4 +98,4 @@ class Engine:
     def _take(self, profile: Profile) -> None:
         self._profile = profile
         duration = profile.duration
-        self._end = None if duration is None else self._started + duration * TICK
+        self.end = None if duration is None else self._started + duration * TICK

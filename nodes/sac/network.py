@@ -58,8 +58,10 @@ class NetworkPort:
         "acks",
         "address",
         "crc",
+        "due",
         "naks",
         "packets",
+        "receiving",
     )
 
     def __init__(
@@ -67,7 +69,7 @@ class NetworkPort:
         address: int,
         settings: SacSettings,
         rate: LineRate,
-        accept: Callable[[bytes, int, int, Ns], None],
+        accept: Callable[[bytes, int, int, Ns], object],
         tell: Callable[[ReportKind, str], None],
     ) -> None:
         self.address = address
@@ -94,11 +96,10 @@ class NetworkPort:
         self.acks = 0
         self.naks = 0
         self.packets = 0
-
-    @property
-    def receiving(self) -> bool:
-        """True while bytes that are not for this node may still matter to it."""
-        return self._receiver.open or self._waits_for is not None
+        #: True while bytes that are not for this node may still matter to it.
+        self.receiving = self._receiver.open
+        #: When something is to be sent next; None when nothing is.
+        self.due: Ns | None = None
 
     def hear(self, heard: Heard) -> None:
         """Bytes have arrived."""
@@ -116,38 +117,40 @@ class NetworkPort:
             elif type(event) is LineFault:
                 self._tell(ReportKind.LOST, f"packet of {len(event.data)} bytes: body over 46 bytes")
             # An ACK is of no consequence to a SAC: it sends nothing that it would repeat.
+        self.receiving = self._receiver.open or self._waits_for is not None
+        self._see_what_is_due()
 
     def send(self, dest: int, body: bytes, not_before: Ns) -> Ns:
         """Queue a packet of the node's own; when it will have been sent, if nothing comes between."""
         data = encode(dest, self.address, body, crc=self.crc)
         begins = max(not_before, self._busy_until())
         self._outbox.append((not_before, data))
+        self._see_what_is_due()
         for _, waiting in self._outbox:
             begins += self._rate.span(len(waiting))
         return begins
 
-    def wake_at(self) -> Ns | None:
-        """When something is to be sent next."""
+    def _see_what_is_due(self) -> None:
         if self._answer is not None:
-            return self._answer_at
-        if self._outbox:
-            return max(self._outbox[0][0], self._sent_until)
-        return None
+            self.due = self._answer_at
+        elif self._outbox:
+            self.due = max(self._outbox[0][0], self._sent_until)
+        else:
+            self.due = None
 
     def wake(self, now: Ns) -> bytes | None:
         """The bytes whose turn it is."""
-        data: bytes
-        if self._answer is not None:
-            if self._answer_at > now:
-                return None
-            data = self._answer
+        if self.due is None or self.due > now:
+            return None
+        data = self._answer
+        if data is not None:
             self._answer = None
             self._waits_for = None
-        elif self._outbox and max(self._outbox[0][0], self._sent_until) <= now:
-            data = self._outbox.popleft()[1]
+            self.receiving = self._receiver.open
         else:
-            return None
+            data = self._outbox.popleft()[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
+        self._see_what_is_due()
         return data
 
     def _busy_until(self) -> Ns:

@@ -48,7 +48,7 @@ class SacNode:
             self._tell,
         )
         self._network = NetworkPort(
-            memory.d_id, self._settings, self._rate, self._accept, self._tell
+            memory.d_id, self._settings, self._rate, self._network_line, self._tell
         )
         self._network.ack = bool(memory.ack)
         self._network.crc = bool(memory.crc)
@@ -71,7 +71,7 @@ class SacNode:
 
     def wake_at(self) -> Ns | None:
         """The next answer or packet to send, or the end of the command that runs."""
-        sends = self._network.wake_at()
+        sends = self._network.due
         ends = self._commands.wake_at()
         if sends is None:
             return ends
@@ -119,7 +119,7 @@ class SacNode:
             )
         self._boot(restored)
 
-    def _accept(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+    def _network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         self._messages.network_line(body, source, destination, now)
 
     def _tell_ops(self, start: bool, at: Ns) -> Ns:

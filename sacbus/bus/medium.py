@@ -208,4 +208,8 @@ class Medium:
         """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""
         if self.watchers or self._router.concerns(sent.data[upto:]):
             return True
-        return any(owner is not sent.sender for owner, _ in place.listeners)
+        sender = sent.sender
+        for owner, _ in place.listeners:  # a plain loop: it is a quarter of any()'s price
+            if owner is not sender:
+                return True
+        return False

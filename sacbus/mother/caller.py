@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 from typing import Protocol as Contract
 
 from sacbus.kernel import MS, LineRate, Ns
@@ -47,12 +47,8 @@ class Clock(Contract):
         """Ns since some start."""
         ...
 
-    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Any:
-        """Call back then. What comes back is only good for :meth:`cancel` (hence ``Any``)."""
-        ...
-
-    def cancel(self, appointment: Any) -> None:
-        """Do not call back."""
+    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
+        """Call back then."""
         ...
 
 
@@ -105,7 +101,11 @@ class Caller:
         self._receiver = PacketReceiver()
         self._waiting: deque[_Request] = deque()
         self._outstanding: _Request | None = None
-        self._overdue: Any = None  # the clock's appointment, see Clock.at
+        #: When the outstanding request's answer is overdue, and when we shall next look. Looking is
+        #: appointed only when no look comes as early: nearly all answers come in time, and nearly
+        #: all requests do without an appointment of their own.
+        self._due: Ns = 0
+        self._watch: Ns | None = None
         #: True while the pause after a packet lasts, or a broadcast is on its way.
         self._pausing = False
         self._broadcasting: _Request | None = None
@@ -164,9 +164,6 @@ class Caller:
     def lose(self, why: str) -> None:
         """The line is gone: everything that waits fails, and so does all that is asked later."""
         self._lost = LineLost(why)
-        if self._overdue is not None:
-            self._clock.cancel(self._overdue)
-            self._overdue = None
         waiting = [self._outstanding, self._broadcasting, *self._waiting]
         self._outstanding = self._broadcasting = None
         self._waiting.clear()
@@ -203,7 +200,10 @@ class Caller:
             self._outstanding = request
             answer = turnaround(len(request.body), nul_follows=True)
             answer += self._rate.span(ANSWER_BYTES)
-            self._overdue = clock.at(now + line_time + answer + self._slack, self._silent)
+            self._due = now + line_time + answer + self._slack
+            if self._watch is None or self._due < self._watch:
+                self._watch = self._due
+                clock.at(self._due, self._look, self._due)
         self._send(request.data)
 
     def _answered(self, answer: Answer) -> None:
@@ -212,8 +212,6 @@ class Caller:
             self.strays += 1
             return
         self._outstanding = None
-        self._clock.cancel(self._overdue)
-        self._overdue = None
         statistics = self.statistics[request.node]
         self._pause()
         if answer.accepted:
@@ -229,12 +227,22 @@ class Caller:
         else:
             request.done(self._failure(Refused, request))
 
-    def _silent(self) -> None:
+    def _look(self, when: Ns) -> None:
+        """See whether the answer that we wait for is overdue."""
+        if self._watch != when:
+            return
+        self._watch = None
         request = self._outstanding
         if request is None:
             return
+        if self._due > self._clock.now:
+            self._watch = self._due
+            self._clock.at(self._due, self._look, self._due)
+        else:
+            self._silent(request)
+
+    def _silent(self, request: _Request) -> None:
         self._outstanding = None
-        self._overdue = None
         self.statistics[request.node].timeouts += 1
         request.last = "silence"
         if not (request.accept_duplicates or repeatable(request.body)):

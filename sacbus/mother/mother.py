@@ -10,7 +10,7 @@ import asyncio
 import re
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
-from typing import Any, Final
+from typing import Final
 
 from sacbus.kernel import MS, SECOND, LineRate, Ns
 from sacbus.links import open_line
@@ -39,13 +39,9 @@ class LoopClock:
         """Ns since the start."""
         return int((self._loop.time() - self._start) * SECOND)
 
-    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Any:
+    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
         """Call back then; gives the loop's timer handle."""
         return self._loop.call_at(self._start + when / SECOND, callback, *arguments)
-
-    def cancel(self, appointment: asyncio.TimerHandle) -> None:
-        """Do not call back."""
-        appointment.cancel()
 
 
 class Mother:

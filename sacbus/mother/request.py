@@ -7,6 +7,7 @@ Source: spec, wire ("Bodies that a device loses or accepts unchecked, and the cu
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 from sacbus.mother.errors import BadRequest
@@ -18,6 +19,7 @@ __all__ = ["checked_address", "safe_body"]
 _UNSAFE_CRCS: Final = frozenset((NUL, STX, ETX))
 
 _UNSAFE_BYTES: Final = {NUL: "NUL", STX: "STX", ETX: "ETX", ACK: "ACK"}
+_UNSAFE: Final = re.compile(b"[%b]" % bytes(_UNSAFE_BYTES)).search
 
 
 def safe_body(body: bytes) -> bytes:
@@ -27,14 +29,14 @@ def safe_body(body: bytes) -> bytes:
     is left alone (its CRC is 00, and a space would make it a message). :class:`BadRequest` for
     bytes 00, 02, 03 and 06, and for what is longer than 46 with its spaces.
     """
-    for value in body:
-        if value in _UNSAFE_BYTES:
-            raise BadRequest(
-                f"line {body.decode('latin-1')!r}: byte {value:02x} ({_UNSAFE_BYTES[value]}) would "
-                "end or break the packet; leave it out"
-            )
+    if (unsafe := _UNSAFE(body)) is not None:
+        value = unsafe[0][0]
+        raise BadRequest(
+            f"line {body.decode('latin-1')!r}: byte {value:02x} ({_UNSAFE_BYTES[value]}) would "
+            "end or break the packet; leave it out"
+        )
     sent = body
-    while body and crc8(sent) in _UNSAFE_CRCS:
+    while crc8(sent) in _UNSAFE_CRCS and body:
         sent += b" "
     if len(sent) > MAX_BODY:
         spaces = len(sent) - len(body)

@@ -95,6 +95,12 @@ class PacketReceiver:
 
         Takes any bytes, split anywhere, and raises nothing.
         """
+        if len(data) == 4 and data[0] == STX and not self._held and data[3] in _ANSWER_ENDINGS:
+            # A four-byte answer on its own, which is what mother hears for every packet of hers.
+            _, dest, src, mark = data
+            if dest != STX and src != STX:
+                self._endings = _ANSWER_ENDINGS[mark]
+                return [Answer(dest, src, mark == ACK)]
         events: list[Heard] = []
         append = events.append
         busy = bool(self._held or self._endings)
