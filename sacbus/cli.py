@@ -7,67 +7,92 @@ Owns arguments, messages and exit statuses; no rule and no state of a bus. Error
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final, NoReturn, TypeVar
 
 import click
 
 from sacbus import __version__
 
-__all__ = ["main"]
+__all__ = ["main", "run"]
+
+_F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command has
 
 #: Exit statuses of ``send`` (spec, cli).
 NAK_STATUS: Final = 3
 NO_ANSWER_STATUS: Final = 4
 UNKNOWN_STATUS: Final = 5
 INTERRUPTED: Final = 130
+USAGE_STATUS: Final = 2
 
-LINK_HELP: Final = "LINK is the path of a serial port or of a bus's pty, such as /tmp/sacbus."
+
+def _verbose(command: _F) -> _F:
+    """``-v``, before a command's name or behind it; :func:`run` looks for it itself."""
+    option = click.option(
+        "-v",
+        "--verbose",
+        is_flag=True,
+        expose_value=False,
+        help="Show the traceback of an error.",
+    )
+    return option(command)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    invoke_without_command=True,
+)
 @click.version_option(__version__, prog_name="sacbus", message="%(prog)s %(version)s")
-@click.option("-v", "--verbose", is_flag=True, help="Show the traceback of an error.")
-def root(verbose: bool) -> None:
+@_verbose
+@click.pass_context
+def root(context: click.Context) -> int | None:
     """A software RS485 bus of virtual SAC motion controllers.
 
     \b
     Example: sacbus serve --nodes 10-19 --pty /tmp/sacbus
              sacbus send /tmp/sacbus 10m400
     """
+    if context.invoked_subcommand is not None:
+        return None
+    # Nothing was asked for; whoever wrote this into a script should notice.
+    click.echo(context.get_help(), err=True)
+    return USAGE_STATUS
 
 
-class NodeRange(click.ParamType):
-    """``10-19,85``: addresses and ranges of them, ascending or not, each once."""
-
-    name = "addresses"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, ...]:
-        """The addresses in the order given."""
-        if isinstance(value, tuple):
-            return value
-        found: list[int] = []
-        for part in str(value).split(","):
-            first, dash, last = part.strip().partition("-")
-            if not first.isdecimal() or (dash and not last.isdecimal()):
-                self.fail(f"expected addresses like 10-19,85, got {part!r} in {value!r}")
-            low, high = int(first), int(last or first)
-            if not 4 <= low <= high <= 255:
-                self.fail(f"expected addresses from 4 to 255, low to high, got {part!r}")
-            found.extend(range(low, high + 1))
-        if len(set(found)) != len(found):
-            twice = next(address for address in found if found.count(address) > 1)
-            self.fail(f"address {twice} is given twice in {value!r}")
-        return tuple(found)
+def _addresses(
+    _ctx: click.Context, _param: click.Parameter, given: str | tuple[int, ...]
+) -> tuple[int, ...]:
+    """``10-19,85``: addresses and ranges of them, in the order given, each once."""
+    if isinstance(given, tuple):
+        return given
+    found: list[int] = []
+    for part in given.split(","):
+        first, dash, last = (word.strip() for word in part.partition("-"))
+        if not _is_number(first) or (dash and not _is_number(last)):
+            raise click.BadParameter(f"expected addresses like 10-19,85, got {part!r}")
+        low, high = int(first), int(last or first)
+        if not 4 <= low <= high <= 255:
+            raise click.BadParameter(f"expected addresses from 4 to 255, low to high, got {part!r}")
+        found.extend(range(low, high + 1))
+    if len(set(found)) != len(found):
+        twice = next(address for address in found if found.count(address) > 1)
+        raise click.BadParameter(f"expected each address once, got {twice} twice")
+    return tuple(found)
 
 
-def _setting(_ctx: click.Context, _param: click.Parameter, given: Sequence[str]) -> dict[str, object]:
+def _is_number(word: str) -> bool:
+    return word.isascii() and word.isdecimal() and len(word) <= 10
+
+
+def _setting(
+    _ctx: click.Context, _param: click.Parameter, given: Sequence[str]
+) -> dict[str, object]:
     """``--set NAME=VALUE``: whole numbers, true/false, or a word."""
     settings: dict[str, object] = {}
     for text in given:
@@ -77,34 +102,80 @@ def _setting(_ctx: click.Context, _param: click.Parameter, given: Sequence[str])
         if value.lower() in ("true", "false"):
             settings[name] = value.lower() == "true"
         else:
-            settings[name] = int(value) if value.isdecimal() else value
+            settings[name] = int(value) if _is_number(value) else value
     return settings
 
 
 @root.command()
-@click.option("--nodes", type=NodeRange(), default="10-12", show_default=True, metavar="10-19,85",
-              help="Addresses of the virtual nodes.")
+@click.option(
+    "--nodes",
+    callback=_addresses,
+    default="10-12",
+    show_default=True,
+    metavar="10-19,85",
+    help="Addresses of the virtual nodes.",
+)
 @click.option("--kind", default="sac", show_default=True, help="Their kind (see sacbus kinds).")
-@click.option("--set", "settings", multiple=True, callback=_setting, metavar="NAME=VALUE",
-              help="A setting of the kind, such as soft_ops=true. May be repeated.")
-@click.option("--receiver", type=click.Choice(["device", "robust"]), default=None,
-              help="How nodes read packets: as the firmware does, or as specified.")
-@click.option("--pty", type=click.Path(path_type=Path), metavar="PATH",
-              help="Make PATH a stable symlink to the bus's pty.")
-@click.option("--baud", type=click.IntRange(300, 4_000_000), default=38_400, show_default=True,
-              help="Line rate.")
-@click.option("--state", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
-              help="Where the nodes' EEPROM is kept. Default: the user's state directory.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    callback=_setting,
+    metavar="NAME=VALUE",
+    help="A setting of the kind, such as soft_ops=true. May be repeated.",
+)
+@click.option(
+    "--receiver",
+    type=click.Choice(["device", "robust"]),
+    default=None,
+    help="How nodes read packets: as the firmware does, or as specified.",
+)
+@click.option(
+    "--pty",
+    type=click.Path(path_type=Path),
+    metavar="PATH",
+    help="Make PATH a stable symlink to the bus's pty.",
+)
+@click.option(
+    "--baud",
+    type=click.IntRange(300, 4_000_000),
+    default=38_400,
+    show_default=True,
+    help="Line rate.",
+)
+@click.option(
+    "--state",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Where the nodes' EEPROM is kept. Default: the user's state directory.",
+)
 @click.option("--ephemeral", is_flag=True, help="Keep the EEPROM in memory only.")
 @click.option("--no-pace", is_flag=True, help="Let the line run ahead of the clock.")
-@click.option("--speed", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True,
-              help="Bus seconds in a second.")
+@click.option(
+    "--speed",
+    type=click.FloatRange(0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="Bus seconds in a second.",
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="For what is left to chance.")
-@click.option("--echo", is_flag=True, help="Give a client its own bytes back, as 2-wire adapters do.")
+@click.option(
+    "--echo", is_flag=True, help="Give a client its own bytes back, as 2-wire adapters do."
+)
 @click.option("--no-table", is_flag=True, help="No live table on a terminal.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of text.")
-def serve(pty: Path | None, state: Path | None, ephemeral: bool, no_pace: bool, no_table: bool,
-          as_json: bool, receiver: str | None, settings: dict[str, object], **given: Any) -> int:
+@_verbose
+def serve(
+    pty: Path | None,
+    state: Path | None,
+    ephemeral: bool,
+    no_pace: bool,
+    no_table: bool,
+    as_json: bool,
+    receiver: str | None,
+    settings: dict[str, object],
+    **given: Any,  # noqa: ANN401 (what Configuration takes under the same names)
+) -> int:
     """Host a bus and print where to connect. Ctrl-C ends it.
 
     \b
@@ -131,11 +202,20 @@ def serve(pty: Path | None, state: Path | None, ephemeral: bool, no_pace: bool, 
 @root.command()
 @click.argument("link")
 @click.argument("line")
-@click.option("--baud", type=click.IntRange(300, 4_000_000), default=38_400, show_default=True,
-              help="Line rate.")
-@click.option("--accept-duplicates", is_flag=True,
-              help="After silence send again even what may then run twice.")
+@click.option(
+    "--baud",
+    type=click.IntRange(300, 4_000_000),
+    default=38_400,
+    show_default=True,
+    help="Line rate.",
+)
+@click.option(
+    "--accept-duplicates",
+    is_flag=True,
+    help="After silence send again even what may then run twice.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the outcome as JSON.")
+@_verbose
 def send(link: str, line: str, baud: int, accept_duplicates: bool, as_json: bool) -> int:
     """Send LINE as mother and wait for the ACK. LINE begins with an address: 85m3000a2d1.
 
@@ -150,8 +230,11 @@ def send(link: str, line: str, baud: int, accept_duplicates: bool, as_json: bool
     from sacbus.mother import NoAnswer, Refused, UnknownOutcome, addressed_line
 
     node, command = addressed_line(line)
-    statuses = {Refused: ("nak", NAK_STATUS), NoAnswer: ("no answer", NO_ANSWER_STATUS),
-                UnknownOutcome: ("unknown", UNKNOWN_STATUS)}
+    statuses = {
+        Refused: ("nak", NAK_STATUS),
+        NoAnswer: ("no answer", NO_ANSWER_STATUS),
+        UnknownOutcome: ("unknown", UNKNOWN_STATUS),
+    }
     report: dict[str, object] = {"node": node, "line": command}
     try:
         report |= asyncio.run(_send(link, node, command, baud, accept_duplicates))
@@ -192,19 +275,51 @@ async def _send(
 
 @root.command("plan", context_settings={"ignore_unknown_options": True})
 @click.argument("commands", nargs=-1, required=True, metavar="COMMAND...")
-@click.option("--ustep", type=click.IntRange(0, 7), default=0, show_default=True,
-              help="Microsteps, as a power of two.")
-@click.option("--sprf", type=click.IntRange(1, 65_535), default=200, show_default=True,
-              help="Full steps per revolution.")
-@click.option("--slow", type=click.IntRange(1, 255), default=10, show_default=True,
-              help="RPM up to which there are no ramps.")
-@click.option("--start-rpm", type=click.IntRange(0), default=0, show_default=True,
-              help="Velocity kept from a command before; 0: from rest.")
-@click.option("--gap/--no-gap", default=True, show_default=True,
-              help="Whether a kept velocity is lost when the next command comes too late.")
+@click.option(
+    "--ustep",
+    type=click.IntRange(0, 7),
+    default=0,
+    show_default=True,
+    help="Microsteps, as a power of two.",
+)
+@click.option(
+    "--sprf",
+    type=click.IntRange(1, 65_535),
+    default=200,
+    show_default=True,
+    help="Full steps per revolution.",
+)
+@click.option(
+    "--slow",
+    type=click.IntRange(1, 255),
+    default=10,
+    show_default=True,
+    help="RPM up to which there are no ramps.",
+)
+@click.option(
+    "--start-rpm",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Velocity kept from a command before; 0: from rest.",
+)
+@click.option(
+    "--gap/--no-gap",
+    default=True,
+    show_default=True,
+    help="Whether a kept velocity is lost when the next command comes too late.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-def plan_command(commands: tuple[str, ...], ustep: int, sprf: int, slow: int, start_rpm: int,
-                 gap: bool, as_json: bool) -> int:
+@_verbose
+def plan_command(
+    commands: tuple[str, ...],
+    ustep: int,
+    sprf: int,
+    slow: int,
+    start_rpm: int,
+    gap: bool,
+    as_json: bool,
+) -> int:
     """Work out what motion commands do: steps in each state, peak speed, duration, warnings.
 
     Several commands are planned as a sequence, each as soon as the last has ended. A COMMAND of -
@@ -219,7 +334,7 @@ def plan_command(commands: tuple[str, ...], ustep: int, sprf: int, slow: int, st
 
     lines: list[str] = []
     for command in commands:
-        lines += click.get_text_stream("stdin").read().split() if command == "-" else [command]
+        lines += sys.stdin.read().split() if command == "-" else [command]
     drive = Drive(sprf=sprf, slow_rpm=slow, ustep=ustep)
     try:
         planned = planning.plan_sequence(lines, drive, start_rpm=start_rpm, gap=gap)
@@ -235,6 +350,7 @@ def plan_command(commands: tuple[str, ...], ustep: int, sprf: int, slow: int, st
 
 @root.command()
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+@_verbose
 def kinds(as_json: bool) -> int:
     """List the kinds of node that are installed, and their settings.
 
@@ -246,21 +362,29 @@ def kinds(as_json: bool) -> int:
 
     found = installed()
     if as_json:
-        click.echo(json.dumps({
-            "kinds": [
+        click.echo(
+            json.dumps(
                 {
-                    "kind": name,
-                    "summary": kind.summary,
-                    "protocol": kind.protocol.name,
-                    "settings": [
-                        {"name": one.name, "default": one.default, "allowed": one.allowed,
-                         "help": one.help}
-                        for one in setting_list(kind.settings)
-                    ],
+                    "kinds": [
+                        {
+                            "kind": name,
+                            "summary": kind.summary,
+                            "protocol": kind.protocol.name,
+                            "settings": [
+                                {
+                                    "name": one.name,
+                                    "default": one.default,
+                                    "allowed": one.allowed,
+                                    "help": one.help,
+                                }
+                                for one in setting_list(kind.settings)
+                            ],
+                        }
+                        for name, kind in found.items()
+                    ]
                 }
-                for name, kind in found.items()
-            ]
-        }))
+            )
+        )
         return 0
     for name, kind in found.items():
         click.echo(f"{name}: {kind.summary}")
@@ -277,11 +401,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def run(arguments: list[str]) -> int:
-    """Run a command; its exit status. Errors that users can do something about are one line."""
-    from sacbus.links import LinkError
+    """Run a command; its exit status. Errors that users can do something about are one line.
+
+    Any other exception comes out with its traceback: it is a defect of ours, and worth a report.
+    """
     from sacbus.mother import MotherError
     from sacbus.node import KindError, SettingError
-    from sacbus.state import StateError
 
     verbose = bool({"-v", "--verbose"} & set(arguments))
     try:
@@ -292,12 +417,17 @@ def run(arguments: list[str]) -> int:
         click.echo("interrupted", err=True)
         return INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has left (head, less); nobody is left to tell.
-        sys.stderr.close()
+        # Whoever read our output has left (head, less), and nobody is left to tell. What is still
+        # buffered must not fail once more at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except (LinkError, MotherError, KindError, SettingError, StateError) as fault:
-        text = fault.args[0] if isinstance(fault, KindError) else str(fault)
+    except (MotherError, KindError, SettingError) as fault:
+        text = str(fault.args[0]) if isinstance(fault, KindError) else str(fault)
         return _failed(text, 1, verbose)
+    except OSError as fault:
+        # Links and the state directory say it in full; the system only what and where.
+        named = f", {fault.filename}" if fault.filename is not None else ""
+        return _failed(f"{fault.strerror}{named}" if fault.strerror else str(fault), 1, verbose)
     return status if isinstance(status, int) else 0
 
 
@@ -311,7 +441,9 @@ def _usage(fault: click.ClickException) -> str:
 
 
 def _failed(text: str, status: int, verbose: bool) -> int:
-    if verbose:
-        traceback.print_exc()
-    click.echo(f"error: {text}", err=True)
+    # A terminal that has been closed takes no message; the status still says it.
+    with contextlib.suppress(OSError):
+        if verbose:
+            traceback.print_exc()
+        click.echo(f"error: {text}", err=True)
     return status
