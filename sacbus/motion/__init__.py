@@ -4,9 +4,23 @@ Owns profiles and everything that is counted in ticks (0.5 us of a node's own os
 only the command types of `language`, and numpy; no asyncio, no clock, no bytes.
 """
 
-from sacbus.motion.drive import Drive, Rpm
+from sacbus.motion.drive import NO_RAMP, TICKS_PER_US, Drive, Rpm
+from sacbus.motion.gap import gap_passes, load_ticks
 from sacbus.motion.legs import State
+from sacbus.motion.limits import Caution, Limit
 from sacbus.motion.planner import plan
 from sacbus.motion.profile import Profile
 
-__all__ = ["Drive", "Profile", "Rpm", "State", "plan"]
+__all__ = [
+    "NO_RAMP",
+    "TICKS_PER_US",
+    "Caution",
+    "Drive",
+    "Limit",
+    "Profile",
+    "Rpm",
+    "State",
+    "gap_passes",
+    "load_ticks",
+    "plan",
+]

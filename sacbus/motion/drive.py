@@ -79,11 +79,6 @@ class Drive:
         exact = Fraction(speed, 100 * self.m)
         return exact.numerator if exact.denominator == 1 else exact
 
-    def real_period(self, nominal: int) -> int:
-        """Ticks a pulse of this nominal period really lasts, at least 1."""
-        period = nominal + self.offset
-        return max(1, period)
-
     def cruise_period(self, cycle_us: int) -> int:
         """Real ticks of a pulse when a full step lasts cycle_us; truncated, as the device does."""
         period = (cycle_us * TICKS_PER_US >> self.ustep) + self.offset

@@ -50,7 +50,7 @@ class LinearLaw:
     def __init__(self, pulses_per_rev: int, acc100: int, rate: int) -> None:
         alpha = 2 * pi / pulses_per_rev
         ticks_per_second = TICKS_PER_MINUTE // 60
-        self._first: Final = FIRST_STEP * sqrt(2 * alpha / (acc100 / 100)) * ticks_per_second
+        self._first = FIRST_STEP * sqrt(2 * alpha / (acc100 / 100)) * ticks_per_second
         self._rate: Final = rate
         self.acc100: Final = acc100
         self._reached = (0, self._first)

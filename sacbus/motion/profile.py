@@ -21,6 +21,7 @@ from sacbus.motion.layout import (
     rides_linear,
 )
 from sacbus.motion.legs import Even, Leg, State
+from sacbus.motion.limits import Caution, cautions, harmless
 from sacbus.motion.ramp import Ticks64
 from sacbus.motion.shares import Shares, harmonic_steps, linear_index
 
@@ -113,6 +114,12 @@ class Profile:
         """
         legs = self.course.legs
         return Place(legs[-1], (legs[-1].count or 1) - 1).pace.period if legs else 0
+
+    @property
+    def warnings(self) -> tuple[Caution, ...]:
+        """What the command asks of the hardware that it cannot give; found when asked for."""
+        asked = self.motion, self.drive, self.start_rpm, self.shares
+        return () if harmless(*asked) else tuple(cautions(*asked, self.course))
 
     def time_of(self, pulse: int) -> int:
         """When a pulse is issued; that of the first pulse not issued is the end.

@@ -107,18 +107,16 @@ class Ramp:
         return self.law.speed(index, max(1, self.period(index) - self._offset))
 
     def index(self, ticks: int, limit: int) -> int:
-        """The pulse whose period runs at `ticks`: the last whose time is not later; < limit."""
+        """The pulse whose period runs at `ticks`: the last whose time is not later.
+
+        `limit` is a pulse known to come after that instant: how far the search must go.
+        """
         head = min(limit, HEAD)
         if self.time(head) > ticks:
             return bisect_right(self.sums, ticks, 0, head + 1) - 1
-        if limit <= HEAD:
-            return limit - 1
-        page = _page(self, self._page_with_time(ticks, limit))
+        page = _page(self, self._page_with_time(ticks))
         run = int(page.times.searchsorted(ticks, "right")) - 1
-        if run >= len(page.periods):
-            return limit - 1
-        within = (ticks - int(page.times[run])) // int(page.periods[run])
-        return min(limit - 1, int(page.starts[run]) + within)
+        return int(page.starts[run]) + (ticks - int(page.times[run])) // int(page.periods[run])
 
     def times(self, first: int, last: int) -> Ticks64:
         """`time(i)` for i in [first, last), as one array."""
@@ -155,11 +153,11 @@ class Ramp:
             _page(self, len(self._mark_index) - 1)
         return bisect_right(self._mark_index, index) - 1
 
-    def _page_with_time(self, ticks: int, limit: int) -> int:
+    def _page_with_time(self, ticks: int) -> int:
         self._open_tail()
-        while self._mark_time[-1] <= ticks and self._mark_index[-1] < limit:
-            _page(self, len(self._mark_index) - 1)
-        return min(bisect_right(self._mark_time, ticks), len(self._mark_time) - 1) - 1
+        while self._mark_time[-1] <= ticks:
+            _page(self, len(self._mark_time) - 1)
+        return bisect_right(self._mark_time, ticks) - 1
 
     def _open_tail(self) -> None:
         if not self._mark_index:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from fractions import Fraction
 
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -50,7 +51,8 @@ def assert_agree(profile: Profile, reference: Run) -> None:
             assert profile.course.place_of(k).pace.speed == int(pulse.rpm * 100 * profile.drive.m)
 
 
-@settings(max_examples=300)
+@pytest.mark.slow
+@settings(max_examples=150)
 @given(data=st.data(), setup=setups, start=st.sampled_from([0, 0, 5, 50, 100, 333]))
 def test_a_command_issues_the_pulses_of_the_reference(
     data: st.DataObject, setup: Setup, start: int
@@ -60,7 +62,8 @@ def test_a_command_issues_the_pulses_of_the_reference(
     assert_agree(plan(motion, drive_of(setup), start), run(motion, setup, start))
 
 
-@settings(max_examples=300)
+@pytest.mark.slow
+@settings(max_examples=150)
 @given(data=st.data(), setup=setups, start=st.sampled_from([0, 0, 80]))
 def test_every_cut_leaves_the_pulses_of_the_reference(
     data: st.DataObject, setup: Setup, start: int
@@ -81,7 +84,8 @@ def test_every_cut_leaves_the_pulses_of_the_reference(
     assert_agree(once.halt(again), expected.halt(again))
 
 
-@settings(max_examples=200)
+@pytest.mark.slow
+@settings(max_examples=100)
 @given(data=st.data(), setup=setups)
 def test_continuous_motion_changes_speed_and_stops_as_the_reference(
     data: st.DataObject, setup: Setup
