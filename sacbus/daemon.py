@@ -19,7 +19,7 @@ from sacbus.kernel import Kernel, LineRate
 from sacbus.links import Link, PtyLink
 from sacbus.mother import Mother
 from sacbus.node import Heard, NodeKind, Report, ReportKind, Snapshot, find_kind, settings_from
-from sacbus.state import StateDirectory
+from sacbus.state import StateDirectory, StateError
 
 __all__ = ["Configuration", "HostedBus", "open_bus"]
 
@@ -88,15 +88,19 @@ class HostedBus:
             mother.hear(heard.data)
 
         port = Port(self.bus.medium, hear, latency=0)
-        mother = Mother(
-            self.host.kernel, port.talk, rate=self.bus.rate, arrive=self.host.arrive
-        )
+        mother = Mother(self.host.kernel, port.talk, rate=self.bus.rate, arrive=self.host.arrive)
         return mother
 
     def save(self, state: StateDirectory) -> None:
-        """Write every node's memory."""
+        """Write every node's memory; StateError for the first that could not be written."""
+        failed: StateError | None = None
         for address, node in self._configured.items():
-            state.save(address, self.kind.name, node.persist())
+            try:
+                state.save(address, self.kind.name, node.persist())
+            except StateError as fault:  # the others' memories are worth no less
+                failed = failed or fault
+        if failed is not None:
+            raise failed
 
 
 @asynccontextmanager
@@ -145,17 +149,16 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
                 kernel,
                 loop,
                 speed=configuration.speed,
-                line_free_at=None
-                if configuration.pace
-                else lambda: bus.medium.free_at(lane),
+                line_free_at=None if configuration.pace else lambda: bus.medium.free_at(lane),
             )
         stack.callback(host.close)
         hosted = HostedBus(configuration, kind, bus, host)
-        if state is not None:
-            stack.callback(hosted.save, state)
         if configuration.pty:
             path = configuration.pty if isinstance(configuration.pty, Path) else None
             link = PtyLink(path, baud=configuration.baud)
             stack.callback(link.close)
             hosted.attach(link)
+        if state is not None:
+            # Last, so that a bus that never ran overwrites nobody's memory.
+            stack.callback(hosted.save, state)
         yield hosted

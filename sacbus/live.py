@@ -16,8 +16,13 @@ from sacbus.node import Snapshot
 __all__ = ["Screen", "table"]
 
 _HEADINGS: Final = ("node", "state", "steps", "RPM", "current", "pending", "ACK", "NAK")
-#: Least width of each column; numbers and texts may widen it while they last.
+#: Width of each column; what is longer widens it while it lasts.
 _WIDTHS: Final = (4, 7, 9, 7, 20, 16, 5, 4)
+_GAP: Final = 2
+#: The columns that give way, in this order, when the terminal is too narrow, and down to what. A
+#: command cut short is still known by its beginning; a number cut short is another number.
+_GIVE_WAY: Final = (5, 4)
+_LEAST: Final = 8
 _RIGHT: Final = frozenset((0, 2, 3, 6, 7))
 
 _COLOURS: Final = {"ACCEL": "green", "CRUISE": "green", "DECEL": "yellow", "SYNC": "magenta"}
@@ -40,10 +45,7 @@ def table(
         shown = sorted(shown[: room - 1], key=lambda snapshot: snapshot.address)
         hidden = f"… and {left_out} more nodes"
     cells = [_cells(snapshot) for snapshot in shown]
-    widths = [
-        max(width, *(len(row[at]) for row in cells)) if cells else width
-        for at, width in enumerate(_WIDTHS)
-    ]
+    widths = _widths(cells, columns)
     lines = [_line(_HEADINGS, widths)[:columns]]
     for snapshot, row in zip(shown, cells, strict=True):
         line = _line(row, widths)[:columns]
@@ -89,7 +91,7 @@ def _cells(snapshot: Snapshot) -> tuple[str, ...]:
     return (
         str(snapshot.address),
         snapshot.state,
-        f"{snapshot.position_steps:g}" if snapshot.position_steps % 1 else str(int(snapshot.position_steps)),
+        _steps(snapshot),
         f"{snapshot.rpm:.1f}",
         snapshot.current,
         waiting,
@@ -98,8 +100,35 @@ def _cells(snapshot: Snapshot) -> tuple[str, ...]:
     )
 
 
+def _widths(cells: Sequence[Sequence[str]], columns: int) -> list[int]:
+    """The columns' widths, such that the whole fits into ``columns`` characters if it can."""
+    widths = [
+        max(width, *(len(row[at]) for row in cells)) if cells else width
+        for at, width in enumerate(_WIDTHS)
+    ]
+    excess = sum(widths) + _GAP * (len(widths) - 1) - columns
+    for at in _GIVE_WAY:
+        given = min(max(excess, 0), widths[at] - _LEAST)
+        widths[at] -= given
+        excess -= given
+    return widths
+
+
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
-    return "  ".join(
-        cell.rjust(width) if at in _RIGHT else cell.ljust(width)
-        for at, (cell, width) in enumerate(zip(cells, widths, strict=True))
-    ).rstrip()
+    return (
+        (" " * _GAP)
+        .join(
+            cell.rjust(width) if at in _RIGHT else _cut(cell, width).ljust(width)
+            for at, (cell, width) in enumerate(zip(cells, widths, strict=True))
+        )
+        .rstrip()
+    )
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else f"{text[: width - 1]}…"
+
+
+def _steps(snapshot: Snapshot) -> str:
+    """Full steps; fractions of one as exactly as microsteps make them."""
+    return f"{snapshot.position_steps:.7f}".rstrip("0").rstrip(".")

@@ -10,6 +10,8 @@ import asyncio
 import json
 import shutil
 import signal
+import sys
+from collections.abc import Callable
 from typing import Final
 
 import click
@@ -25,6 +27,9 @@ __all__ = ["serve"]
 #: Status after Ctrl-C, as a shell expects it (128 + SIGINT).
 INTERRUPTED: Final = 130
 
+#: Status after the terminal was closed (128 + SIGHUP).
+HUNG_UP: Final = 129
+
 #: The table is drawn this often; faster than this the eye does not read numbers.
 REFRESH: Final = 0.2
 
@@ -33,7 +38,11 @@ REPORTS_A_REFRESH: Final = 5
 
 
 async def serve(configuration: Configuration, *, as_json: bool, show_table: bool) -> int:
-    """Host a bus until SIGINT (status 130) or SIGTERM (status 0)."""
+    """Host a bus until SIGINT (status 130), SIGTERM (0) or a closed terminal (129).
+
+    Raises what :func:`~sacbus.daemon.open_bus` does, and OSError when standard output cannot be
+    written any more (BrokenPipeError: its reader has left); the bus is closed in order then too.
+    """
     loop = asyncio.get_running_loop()
     ended: asyncio.Future[int] = loop.create_future()
 
@@ -44,8 +53,15 @@ async def serve(configuration: Configuration, *, as_json: bool, show_table: bool
     # Before anything is opened: a signal at any instant ends in an orderly close.
     loop.add_signal_handler(signal.SIGINT, end, INTERRUPTED)
     loop.add_signal_handler(signal.SIGTERM, end, 0)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup leaves it
+        loop.add_signal_handler(signal.SIGHUP, end, HUNG_UP)
     async with open_bus(configuration) as bus:
-        output = _output(bus, as_json=as_json, show_table=show_table)
+
+        def lost(fault: OSError) -> None:
+            if not ended.done():
+                ended.set_exception(fault)
+
+        output = _output(bus, lost, as_json=as_json, show_table=show_table)
         output.ready()
         for report in bus.bus.reports:
             output.report(report)
@@ -64,30 +80,41 @@ class _Lines:
 
     interval: float | None = None
 
-    def __init__(self, bus: HostedBus) -> None:
+    def __init__(self, bus: HostedBus, lost: Callable[[OSError], None]) -> None:
+        """``lost`` is told once when nothing can be written any more."""
         self._bus = bus
+        self._lost: Callable[[OSError], None] | None = lost
+
+    def say(self, text: str) -> None:
+        """Write some text at once. Reports come from within the kernel: nothing is raised here."""
+        if self._lost is None:
+            return
+        try:
+            click.echo(text, nl=False)
+        except OSError as fault:
+            lost, self._lost = self._lost, None
+            lost(fault)
 
     def ready(self) -> None:
         configuration = self._bus.configuration
         count = len(configuration.nodes)
-        click.echo(
+        self.say(
             f"sacbus {__version__}: {count} {configuration.kind} "
             f"node{'s' if count != 1 else ''} ({_ranges(configuration.nodes)}) "
-            f"at {configuration.baud} baud"
+            f"at {configuration.baud} baud\n"
         )
         for link in self._bus.links:
-            click.echo(f"connect to {link.where}")
-        click.echo("Ctrl-C ends it")
-        click.get_text_stream("stdout").flush()
+            self.say(f"connect to {link.where}\n")
+        self.say("Ctrl-C ends it\n")
 
     def report(self, report: Report) -> None:
-        click.echo(f"{report.when / SECOND:.6f} {report}")
+        self.say(f"{report.when / SECOND:.6f} {_printable(str(report))}\n")
 
     def refresh(self) -> None:
         """Nothing to draw."""
 
     def stopped(self) -> None:
-        click.echo("stopped; port closed")
+        self.say("stopped; port closed\n")
 
 
 class _Json(_Lines):
@@ -132,10 +159,8 @@ class _Json(_Lines):
             }
         )
 
-    @staticmethod
-    def _write(what: dict[str, object]) -> None:
-        click.echo(json.dumps(what))
-        click.get_text_stream("stdout").flush()
+    def _write(self, what: dict[str, object]) -> None:
+        self.say(json.dumps(what) + "\n")
 
 
 class _Table(_Lines):
@@ -143,8 +168,8 @@ class _Table(_Lines):
 
     interval: float | None = REFRESH
 
-    def __init__(self, bus: HostedBus) -> None:
-        super().__init__(bus)
+    def __init__(self, bus: HostedBus, lost: Callable[[OSError], None]) -> None:
+        super().__init__(bus, lost)
         self._screen = Screen()
         self._reports = 0
         self._unseen = 0
@@ -157,19 +182,17 @@ class _Table(_Lines):
         if self._reports > REPORTS_A_REFRESH:
             self._unseen += 1
         else:
-            click.echo(self._screen.above(str(report)), nl=False)
+            self.say(self._screen.above(_printable(str(report))))
 
     def refresh(self) -> None:
         self._reports = 0
         if self._unseen:
-            click.echo(self._screen.above(f"… and {self._unseen} more reports"), nl=False)
+            self.say(self._screen.above(f"… and {self._unseen} more reports"))
             self._unseen = 0
         size = shutil.get_terminal_size()
-        lines = table(
-            self._bus.snapshots(), size.columns - 1, max(size.lines - 6, 3), colour=True
-        )
+        lines = table(self._bus.snapshots(), size.columns - 1, max(size.lines - 6, 3), colour=True)
         lines.append(self._line()[: size.columns - 1])
-        click.echo(self._screen.draw(lines), nl=False)
+        self.say(self._screen.draw(lines))
 
     def _line(self) -> str:
         """The line's load since the last look, and its counts."""
@@ -185,12 +208,19 @@ class _Table(_Lines):
         )
 
 
-def _output(bus: HostedBus, *, as_json: bool, show_table: bool) -> _Lines:
+def _output(
+    bus: HostedBus, lost: Callable[[OSError], None], *, as_json: bool, show_table: bool
+) -> _Lines:
     if as_json:
-        return _Json(bus)
-    if show_table and click.get_text_stream("stdout").isatty():
-        return _Table(bus)
-    return _Lines(bus)
+        return _Json(bus, lost)
+    if show_table and sys.stdout.isatty():
+        return _Table(bus, lost)
+    return _Lines(bus, lost)
+
+
+def _printable(text: str) -> str:
+    """``text`` without control characters: what nodes are sent may be anything, escapes too."""
+    return "".join(one if one.isprintable() else f"\\x{ord(one):02x}" for one in text)
 
 
 def _ranges(addresses: tuple[int, ...]) -> str:

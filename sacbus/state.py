@@ -20,6 +20,8 @@ __all__ = ["StateDirectory", "StateError", "default_directory"]
 
 _FORMAT: Final = 1
 
+_CURE: Final = "choose another directory with --state DIR, or --ephemeral to keep nothing"
+
 
 class StateError(OSError):
     """The state directory cannot be used; the text says what, where and what to do."""
@@ -84,19 +86,16 @@ class StateDirectory:
         try:
             self._place.mkdir(parents=True, exist_ok=True)
         except OSError as fault:
-            raise self._unusable("create", self._place, fault) from fault
-        if not os.access(self._place, os.W_OK | os.X_OK):
             raise StateError(
-                f"cannot write the state directory, {self._place}, "
-                "choose another with --state DIR, or --ephemeral to keep nothing"
-            )
+                f"cannot create the state directory ({fault.strerror or fault}), {self._place}, "
+                f"{_CURE}"
+            ) from fault
+        if not os.access(self._place, os.W_OK | os.X_OK):
+            raise StateError(f"cannot write the state directory, {self._place}, {_CURE}")
 
     @staticmethod
     def _unusable(what: str, path: Path, fault: OSError) -> StateError:
-        return StateError(
-            f"cannot {what} node memory ({fault.strerror or fault}), {path}, "
-            "choose another directory with --state DIR, or --ephemeral to keep nothing"
-        )
+        return StateError(f"cannot {what} node memory ({fault.strerror or fault}), {path}, {_CURE}")
 
 
 def _encode(kind: str, memory: Mapping[str, int]) -> bytes:
@@ -108,7 +107,7 @@ def _decode(content: bytes, kind: str) -> tuple[dict[str, int] | None, str]:
     """The memory, or None and what is wrong with the file."""
     try:
         stored = json.loads(content)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None, "not readable as JSON"
     if not isinstance(stored, dict) or not isinstance(stored.get("memory"), dict):
         return None, "not a node's memory"

@@ -9,8 +9,11 @@ which only a write will then show; it hands out a connection before it is made; 
 from __future__ import annotations
 
 import asyncio
+import errno
+import termios
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from typing import Final
 
 import serial
 import serial_asyncio
@@ -18,6 +21,19 @@ import serial_asyncio
 from .errors import LinkError
 
 __all__ = ["Line", "open_line"]
+
+_CHECK: Final = "check the path, and whether the bus is running"
+_WAIT: Final = "wait until the other program has closed it"
+_REASONS: Final = {
+    errno.ENOENT: ("no such file", _CHECK),
+    errno.ENXIO: ("no such device", "plug it in, or check the path"),
+    errno.EISDIR: ("it is a directory", _CHECK),
+    errno.ENOTTY: ("it is not a serial port", _CHECK),
+    errno.EACCES: ("permission denied", "join the group that owns it, often dialout"),
+    errno.EBUSY: ("another program has it", _WAIT),
+    errno.EWOULDBLOCK: ("another program has it", _WAIT),
+    errno.EIO: ("nobody is at its other end", _CHECK),
+}
 
 
 class Line(asyncio.Protocol):
@@ -76,7 +92,7 @@ class Line(asyncio.Protocol):
 
 @asynccontextmanager
 async def open_line(link: str, baud: int) -> AsyncIterator[Line]:
-    """Open a serial port or pty by its path, 8N1, raw, for oneself alone; closed at the block's end.
+    """Open a serial port or pty by its path, 8N1, raw, for oneself alone; closed at the end.
 
     LinkError in one line when that cannot be had.
     """
@@ -90,9 +106,8 @@ async def open_line(link: str, baud: int) -> AsyncIterator[Line]:
             loop, lambda: Line(link), link, baudrate=baud, exclusive=True
         )
     except (serial.SerialException, OSError, ValueError) as fault:
-        raise LinkError(
-            f"cannot open the line ({_reason(fault)})", link, "check the path, and who else has it"
-        ) from fault
+        why, remedy = _reason(fault)
+        raise LinkError(f"cannot open the line ({why})", link, remedy) from fault
     try:
         await line.made.wait()
         yield line
@@ -102,6 +117,20 @@ async def open_line(link: str, baud: int) -> AsyncIterator[Line]:
         await asyncio.sleep(0)
 
 
-def _reason(fault: Exception) -> str:
-    cause = fault.__context__ if isinstance(fault, serial.SerialException) else fault
-    return getattr(cause, "strerror", None) or str(fault)
+def _reason(fault: Exception) -> tuple[str, str]:
+    """Why a port cannot be opened, and what to do; pyserial puts the system's error into a text."""
+    cause: BaseException | None = fault
+    while cause is not None:
+        number = _number(cause)
+        if number in _REASONS:
+            return _REASONS[number]
+        cause = cause.__context__
+    return getattr(fault, "strerror", None) or str(fault), "check the path and the rate"
+
+
+def _number(fault: BaseException) -> int | None:
+    """The system's error number; ``termios.error`` has it as its first argument only."""
+    number = getattr(fault, "errno", None)
+    if number is None and isinstance(fault, termios.error):
+        number = fault.args[0]
+    return number

@@ -76,6 +76,7 @@ class _Request:
     attempts: int = 0
     sent_at: Ns = 0
     last: str = "none"
+    withdrawn: bool = False
 
 
 class Caller:
@@ -148,8 +149,27 @@ class Caller:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
         body = safe_body(line)
         self._enqueue(
-            _Request(GENERAL_CALL, body, encode(GENERAL_CALL, MOTHER, body), done, False)
+            _Request(
+                GENERAL_CALL,
+                body,
+                encode(GENERAL_CALL, MOTHER, body),
+                done,
+                accept_duplicates=False,
+            )
         )
+
+    def withdraw(self, done: Callable[[Acknowledged | Sent | MotherError], None]) -> None:
+        """Nobody waits any more for the request of this ``done``.
+
+        What has not been sent never will be. What has cannot be called back: the line stays taken
+        until its answer is in or overdue, but it is not sent again.
+        """
+        for request in self._waiting:
+            if request.done is done:
+                self._waiting.remove(request)
+                return
+        if self._outstanding is not None and self._outstanding.done is done:
+            self._outstanding.withdrawn = True
 
     def hear(self, data: bytes) -> None:
         """Bytes from the line."""
@@ -222,7 +242,7 @@ class Caller:
             return
         statistics.naks += 1
         request.last = "NAK"
-        if request.attempts < self._tries:
+        if request.attempts < self._tries and not request.withdrawn:
             self._waiting.appendleft(request)
         else:
             request.done(self._failure(Refused, request))
@@ -247,7 +267,7 @@ class Caller:
         request.last = "silence"
         if not (request.accept_duplicates or repeatable(request.body)):
             request.done(self._failure(UnknownOutcome, request))
-        elif request.attempts < self._tries:
+        elif request.attempts < self._tries and not request.withdrawn:
             self._waiting.appendleft(request)
         else:
             request.done(self._failure(NoAnswer, request))
@@ -270,7 +290,7 @@ class Caller:
         self._next()
 
     def _failure(
-        self, kind: type[Refused] | type[NoAnswer] | type[UnknownOutcome], request: _Request
+        self, kind: type[Refused | NoAnswer | UnknownOutcome], request: _Request
     ) -> MotherError:
         line = request.body.decode("latin-1").rstrip(" ")
         return kind(request.node, line, request.attempts, request.last)

@@ -1,11 +1,11 @@
-"""What can go wrong between mother and a node; one small tree.
+"""What can go wrong between mother and a node; one small tree, with what a caller may expect.
 
-    MotherError                 everything below
-    ├── BadRequest (ValueError)     we were asked to send what no node could receive
-    ├── Refused                     the node answered NAK, every time
-    ├── NoAnswer (TimeoutError)     silence, and what was asked may safely be asked again
-    ├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
-    └── LineLost (ConnectionError)  the link is gone
+MotherError                        everything below
+├── BadRequest (ValueError)        we were asked to send what no node could receive
+├── Refused                        the node answered NAK, every time
+├── NoAnswer (TimeoutError)        silence, and what was asked may safely be asked again
+├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
+└── LineLost (ConnectionError)     the link is gone
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ __all__ = ["LINK_SLACK", "LoopClock", "Mother", "addressed_line"]
 #: both ways, and a busy machine.
 LINK_SLACK: Final[Ns] = 100 * MS
 
-_ADDRESSED: Final = re.compile(r"(\d+)(.*)", re.DOTALL)
+_ADDRESSED: Final = re.compile(r"0*([0-9]+)(.*)", re.DOTALL)
 
 
 class LoopClock:
@@ -37,7 +37,8 @@ class LoopClock:
     @property
     def now(self) -> Ns:
         """Ns since the start."""
-        return int((self._loop.time() - self._start) * SECOND)
+        # Rounded: a timer that fires at its very time must not find itself a nanosecond early.
+        return round((self._loop.time() - self._start) * SECOND)
 
     def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
         """Call back then; gives the loop's timer handle."""
@@ -59,8 +60,11 @@ class Mother:
         slack: Ns = SLACK,
         arrive: Callable[..., None] | None = None,
     ) -> None:
-        """``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a
-        host's, when mother sits on a bus in this process."""
+        """Have ``send`` put bytes on a line, with ``slack`` for answers beyond the line's figures.
+
+        ``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a host's,
+        when mother sits on a bus in this process.
+        """
         self._caller = Caller(clock, send, rate=rate, slack=slack)
         self._arrive = arrive or _call
 
@@ -70,13 +74,16 @@ class Mother:
         """Mother on a serial port or pty, for an ``async with`` block.
 
         ``link`` is a path. Raises :class:`~sacbus.links.LinkError` when it cannot be opened; a line
-        lost later raises :class:`LineLost` in every call.
+        lost later raises :class:`LineLost` in every call, and so does one after the block.
         """
         clock = LoopClock(asyncio.get_running_loop())
         async with open_line(link, baud) as line:
             mother = cls(clock, line.send, rate=LineRate(baud), slack=LINK_SLACK)
             line.start(mother.hear, mother.lose)
-            yield mother
+            try:
+                yield mother
+            finally:
+                mother.lose(f"the line was closed, {link}, connect again")
 
     @property
     def statistics(self) -> Mapping[int, NodeStatistics]:
@@ -98,7 +105,8 @@ class Mother:
 
         Raises :class:`Refused`, :class:`NoAnswer`, :class:`UnknownOutcome`, :class:`LineLost`, and
         :class:`BadRequest` for what cannot be sent. ``accept_duplicates`` lets a command that is
-        not idempotent be sent again after silence; it may then run twice.
+        not idempotent be sent again after silence; it may then run twice. A cancelled call whose
+        turn has not come is never sent; one that is out is not sent again.
         """
         outcome = await self._outcome(
             lambda done: self._caller.call(
@@ -120,14 +128,18 @@ class Mother:
 
         def done(outcome: Acknowledged | Sent | MotherError) -> None:
             if future.done():
-                return  # the caller was cancelled; the packet was sent all the same
+                return  # the caller was cancelled while the packet was on its way
             if isinstance(outcome, MotherError):
                 future.set_exception(outcome)
             else:
                 future.set_result(outcome)
 
         self._arrive(ask, done)
-        return await future
+        try:
+            return await future
+        finally:
+            if future.cancelled():
+                self._caller.withdraw(done)
 
 
 def addressed_line(text: str) -> tuple[int, str]:
@@ -142,9 +154,9 @@ def addressed_line(text: str) -> tuple[int, str]:
             f"line {text!r}: expected an address before the command, as in 85m3000a2d1 "
             "(0 for all nodes)"
         )
-    node = int(found[1])
+    node = int(found[1][:4])
     if node > 255:
-        raise BadRequest(f"node {node}: expected an address from 4 to 255, or 0 for all nodes")
+        raise BadRequest(f"node {found[1]}: expected an address from 4 to 255, or 0 for all nodes")
     return node, found[2]
 
 
