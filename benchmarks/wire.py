@@ -1,37 +1,19 @@
 """How fast the wire is: packets per second through both receivers, and encoding.
 
-    python benchmarks/wire.py [--json] [--rounds N]
-
-Every figure is the median of several rounds and stands beside a baseline of the same run, a plain
-loop over the same bytes, since machines differ: the ratio travels, the figure does not. All packets
-have 20 bytes (a body of 14). The goals are stated for CPython 3.11 with crcmod's C extension.
+The baseline is a plain loop over the same bytes. All packets have 20 bytes (a body of 14). The
+goals are stated for CPython 3.11 with crcmod's C extension.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import platform
 import random
-import statistics
-import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 
-from sacbus.wire import CRC_IS_FAST, DeviceReceiver, PacketReceiver, ack, crc8, encode
+from benchmarks.figure import Figure, alternate
+from sacbus.wire import DeviceReceiver, PacketReceiver, ack, crc8, encode
 
 PACKETS = 20_000
 OWN = 82
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One measurement: packets per second, and how many times as fast as the baseline."""
-
-    name: str
-    per_second: float
-    ratio: float
-    goal_per_second: float | None = None
 
 
 def body(rng: random.Random) -> bytes:
@@ -83,16 +65,8 @@ def device_a_packet_a_call(packets: list[bytes]) -> int:
     return sum(receive(packet) is not None for packet in packets)
 
 
-def seconds(act: Callable[[], int], expected: int) -> float:
-    began = time.perf_counter()
-    done = act()
-    took = time.perf_counter() - began
-    assert done == expected, f"{done} events, expected {expected}"
-    return took
-
-
-def measure(rounds: int) -> list[Figure]:
-    """All figures; baseline and measurement alternate, so that both meet the same weather."""
+def figures(rounds: int) -> list[Figure]:
+    """All figures of the wire."""
     own = stream(lambda _: OWN)
     one_in_ten = stream(lambda k: OWN if k % 10 == 0 else 10 + k % 70)
     rng = random.Random(2)
@@ -104,10 +78,9 @@ def measure(rounds: int) -> list[Figure]:
     damaged = b"".join(
         packet if k % 100 else packet[:7] + b"\xff" + packet[8:] for k, packet in enumerate(packets)
     )
-    nuls = plain_byte_loop(own)
     acts: list[tuple[str, Callable[[], int], int, float | None]] = [
-        ("robust", lambda: robust(own), PACKETS, 1e6),
         ("robust, in chunks of 4096 bytes", lambda: robust_in_chunks(own), PACKETS, 1e6),
+        ("robust, 400 kB in one call", lambda: robust(own), PACKETS, 1e6),
         ("robust, pairs of packet and ACK", lambda: robust(answered), 2 * PACKETS, None),
         ("robust, without CRC", lambda: robust(unchecked), PACKETS, None),
         ("robust, CRC of any value", lambda: robust(any_crc), PACKETS, None),
@@ -117,37 +90,20 @@ def measure(rounds: int) -> list[Figure]:
         ("device, a call a packet", lambda: device_a_packet_a_call(packets), PACKETS, None),
         ("encode", lambda: sum(encode(OWN, 1, text)[0] == 2 for text in bodies), PACKETS, None),
     ]
-    figures = []
+    found = []
     for name, act, expected, goal in acts:
-        took, baseline = [], []
-        for _ in range(rounds):
-            baseline.append(seconds(lambda: plain_byte_loop(own), nuls))
-            took.append(seconds(act, expected))
-        median = statistics.median(took)
-        ratio = statistics.median(baseline) / median
-        figures.append(Figure(name, PACKETS / median, ratio, goal))
-    return figures
-
-
-def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description="Packets per second through sacbus.wire.")
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
-    parser.add_argument("--rounds", type=int, default=15, help="rounds a median is taken of")
-    options = parser.parse_args(argv)
-    figures = measure(options.rounds)
-    if options.json:
-        about = {"python": platform.python_version(), "crc_is_fast": CRC_IS_FAST}
-        print(json.dumps({"benchmark": "wire", **about, "figures": [asdict(f) for f in figures]}))
-        return 0
-    print(f"20-byte packets, CPython {platform.python_version()}, crcmod in C: {CRC_IS_FAST}")
-    for figure in figures:
-        goal = f"  goal {figure.goal_per_second / 1e6:.1f}" if figure.goal_per_second else ""
-        print(
-            f"{figure.name:<34}{figure.per_second / 1e6:6.2f} M/s"
-            f"{figure.ratio:7.2f} x a byte loop{goal}"
+        done = act()
+        assert done == expected, f"{name}: {done} events, expected {expected}"
+        took, baseline = alternate(act, lambda: plain_byte_loop(own), rounds)
+        found.append(
+            Figure(
+                name,
+                PACKETS / took,
+                "packets/s",
+                baseline / took,
+                "a byte loop",
+                goal,
+                "value, at least" if goal else "",
+            )
         )
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    return found

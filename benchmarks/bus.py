@@ -1,0 +1,126 @@
+"""How fast a whole bus is in virtual time: mother, line, 250 nodes, profiles, ACKs.
+
+Every command is a distinct line that a node parses, plans and runs; every ACK is counted. The
+baseline is what the kernel must do at least: five bare heap events an exchange.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from itertools import count
+
+from benchmarks.figure import Figure, alternate
+from benchmarks.kernel import EVENTS, bare_heap
+from nodes.sac import KIND, SacSettings
+from sacbus.bus import Bus, Port
+from sacbus.kernel import SECOND, Kernel
+from sacbus.mother import Acknowledged, Caller
+
+NODES = 250
+FIRST = 6
+#: Exchanges in a round; an integer number of rounds over all nodes.
+EXCHANGES = 5_000
+BROADCASTS = 100
+
+
+class FullBus:
+    """A bus with some nodes that have sharp ramps, and mother on it."""
+
+    def __init__(self, nodes: int, acceleration: int) -> None:
+        self.kernel = Kernel()
+        self.bus = Bus(self.kernel, KIND.protocol)
+        for address in range(FIRST, FIRST + nodes):
+            self.bus.add(KIND.create(address, SacSettings(), self.bus.rate, self.bus.tell))
+        self.answers: Counter[int] = Counter()
+        port = Port(self.bus.medium, lambda heard, _now: self.caller.hear(heard.data), latency=0)
+        self.caller = Caller(self.kernel, port.talk)
+        self.lines = count()
+        for line in (b"a%d" % acceleration, b"d%d" % acceleration):
+            self.caller.broadcast(line, lambda _outcome: None)
+        self.kernel.run()
+
+    def exchange(self, times: int, addresses: range, steps: int) -> None:
+        """``times`` commands, each sent when the one before is acknowledged.
+
+        Lines are distinct: ``steps`` to twice as many steps at 250 to 399 RPM.
+        """
+        caller, answers = self.caller, self.answers
+        left = times
+
+        def done(outcome: object) -> None:
+            nonlocal left
+            assert isinstance(outcome, Acknowledged), outcome
+            answers[outcome.node] += 1
+            left -= 1
+            if left:
+                ask()
+
+        def ask() -> None:
+            number = next(self.lines)
+            line = b"m%dv%d" % (steps + number // 150 % steps, 250 + number % 150)
+            caller.call(addresses[number % len(addresses)], line, done)
+
+        ask()
+        while left:
+            self.kernel.run_until(self.kernel.now + SECOND)
+
+    def broadcast(self, times: int) -> None:
+        """``times`` distinct broadcasts, which every node obeys."""
+        left = times
+
+        def done(_outcome: object) -> None:
+            nonlocal left
+            left -= 1
+
+        for _ in range(times):
+            self.caller.broadcast(b"v%d" % (100 + next(self.lines) % 100_000), done)
+        while left:
+            self.kernel.run_until(self.kernel.now + SECOND)
+
+
+def figures(rounds: int) -> list[Figure]:
+    """Packets per second, with all nodes in use and with most of them idle; broadcasts."""
+    found = []
+    events = EVENTS / (5 * EXCHANGES)
+    few = range(FIRST, FIRST + 10)
+    # A node is asked again after 7 ms x the nodes in use: by then it is done with these commands.
+    for name, nodes, addresses, acceleration, steps, goal in (
+        ("bus, 250 nodes, all of them busy", NODES, range(FIRST, FIRST + NODES), 10, 200, 150e3),
+        ("bus, 250 nodes, 240 of them idle", NODES, few, 400, 20, None),
+        ("bus, 10 nodes, none of them idle", 10, few, 400, 20, None),
+    ):
+        full = FullBus(nodes, acceleration)
+        act = _exchanges(full, addresses, steps)
+        act()
+        took, baseline = alternate(act, bare_heap, rounds)
+        assert sum(full.answers.values()) == (rounds + 1) * EXCHANGES
+        assert not full.bus.medium.counters().collided
+        assert not full.bus.report_counts, full.bus.report_counts
+        found.append(
+            Figure(
+                name,
+                2 * EXCHANGES / took,
+                "packets/s",
+                baseline / events / took,
+                "5 bare heap events an exchange",
+                goal,
+                "value, at least" if goal else "",
+            )
+        )
+    full = FullBus(NODES, 10)
+    took, baseline = alternate(lambda: full.broadcast(BROADCASTS), bare_heap, rounds)
+    found.append(
+        Figure(
+            "broadcast to 250 nodes, parsed and obeyed",
+            BROADCASTS / took,
+            "broadcasts/s",
+            baseline / EVENTS * NODES * BROADCASTS / took,
+            "a bare heap event a node",
+        )
+    )
+    return found
+
+
+def _exchanges(full: FullBus, addresses: range, steps: int) -> Callable[[], None]:
+    return lambda: full.exchange(EXCHANGES, addresses, steps)

@@ -1,0 +1,71 @@
+"""The server processes that the pty benchmarks talk to: ``python -m benchmarks.server KIND``.
+
+KIND is ``paced`` or ``unpaced`` (sacbus) or ``echo``: the least that any server must do, a pty
+whose requests are answered with four bytes from an ``add_reader`` callback. Prints the port's
+path; each line on its standard input is answered with the processor time used so far, in seconds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import pty
+import sys
+import time
+import tty
+
+from benchmarks import REQUEST
+from sacbus.daemon import Configuration, open_bus
+from sacbus.wire import ack
+
+ANSWER = ack(1, 10)
+
+
+async def serve_echo() -> None:
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    got = 0
+
+    def read() -> None:
+        nonlocal got
+        got += len(os.read(master, 65_536))
+        while got >= len(REQUEST):
+            got -= len(REQUEST)
+            os.write(master, ANSWER)
+
+    asyncio.get_running_loop().add_reader(master, read)
+    print(os.ttyname(slave), flush=True)
+    await _tell_time()
+
+
+async def serve_bus(*, pace: bool) -> None:
+    configuration = Configuration(pty=True, pace=pace)
+    async with open_bus(configuration) as bus:
+        print(bus.links[0].where, flush=True)
+        await _tell_time()
+
+
+async def _tell_time() -> None:
+    loop = asyncio.get_running_loop()
+    ended = loop.create_future()
+
+    def asked() -> None:
+        if os.read(0, 4_096):
+            print(time.process_time(), flush=True)
+        else:
+            loop.remove_reader(0)
+            ended.set_result(None)
+
+    loop.add_reader(0, asked)
+    await ended
+
+
+def main(argv: list[str]) -> int:
+    kind = argv[0]
+    asyncio.run(serve_echo() if kind == "echo" else serve_bus(pace=kind == "paced"))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
