@@ -50,17 +50,13 @@ class PtyPair:
     def let_go(self) -> None:
         """Close our own slave end, so that `read` can tell whether clients have theirs open.
 
-        Only where the line keeps its settings meanwhile and the master can set them: on Linux.
+        Until then it takes somebody to be there always. Only for Linux, where the line keeps its
+        settings meanwhile and the master can set them.
         """
         if self._held is not None:
             self._settings = LineSettings(self.master)
             os.close(self._held)
             self._held = None
-
-    def hold(self) -> None:
-        """Open a slave end of our own; from now on `read` takes somebody to be there always."""
-        if self._held is None:
-            self._held = os.open(self.path, _SLAVE)
 
     def read(self) -> bytes | None:
         """What clients have written, b"" if nothing waits, None if nobody has the slave open."""

@@ -223,6 +223,20 @@ def test_a_directory_without_permission_is_refused(
     assert error.where == str(path)
 
 
+def test_a_symlink_that_cannot_be_removed_is_told_and_the_lock_let_go(
+    path: Path, request: pytest.FixtureRequest
+) -> None:
+    link = Symlink(path)
+    link.claim("/dev/pts/7")
+    path.parent.chmod(0o555)
+    path.parent.parent.chmod(0o755)
+    path.parent.parent.parent.chmod(0o755)
+    request.getfixturevalue("unprivileged")
+    with pytest.raises(LinkError, match="cannot remove the symlink"):
+        link.release()
+    link.release()
+
+
 def test_release_leaves_alone_what_others_have_put_there(path: Path) -> None:
     link = Symlink(path)
     link.claim("/dev/pts/7")
