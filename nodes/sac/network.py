@@ -82,7 +82,7 @@ class NetworkPort:
         self._receiver: DeviceReceiver | RobustReceiver = (
             RobustReceiver(address) if self._robust else DeviceReceiver(address)
         )
-        #: The ACK or NAK that waits, and when its first bit goes out.
+        #: The ACK or NAK that waits, and when its first bit goes out, or would if there were one.
         self._answer: bytes | None = None
         self._answer_at: Ns = 0
         #: While bytes may yet put the answer off: how many (-1: any number), and the body's length.
@@ -108,11 +108,12 @@ class NetworkPort:
             self._put_off(heard, *self._waits_for)
         start = heard.begun_before(self._deaf_until) if self._deaf_until > heard.start else 0
         receive = self._receiver.receive
-        while (found := receive(data, start)) is not None:
+        size = len(data)
+        while start < size and (found := receive(data, start)) is not None:
             event, start = found
             if type(event) is Packet:
                 self._packet(event, heard, start)
-                if self._deaf_until > heard.start:
+                if start < size and self._deaf_until > heard.start:
                     start = max(start, heard.begun_before(self._deaf_until))
             elif type(event) is LineFault:
                 self._tell(ReportKind.LOST, f"packet of {len(event.data)} bytes: body over 46 bytes")
@@ -187,9 +188,9 @@ class NetworkPort:
             else:
                 self.acks += 1
                 self._answer = ack(packet.src, self.address)
-            self._answer_at = replies
-            if self._turnaround and not self._robust and (wrong or not run):
-                self._waits_for = (limit, size)
+        self._answer_at = replies
+        if self._turnaround and not self._robust and (answered if wrong else not run):
+            self._waits_for = (limit, size)
         if wrong:
             return
         if not answered:
@@ -213,7 +214,11 @@ class NetworkPort:
         self._answer_at = heard.ends(run - 1) + turnaround(size, nul_follows=True)
         if limit > 0:
             self._waits_for = None
-            if self._deaf:
+            if self._answer is None:
+                self._sent_until = max(self._sent_until, self._answer_at)
+                if self._deaf:
+                    self._deaf_until = heard.ends(run - 1) + deaf_time(size, answered=False)
+            elif self._deaf:
                 self._deaf_until += self._answer_at - was
         elif run < len(bytes_come):
             self._waits_for = None

@@ -22,6 +22,9 @@ __all__ = ["SAC_PROTOCOL", "SacProtocol"]
 _TRIGGER: Final = re.compile(
     rb"\x02[^\x02\x03]\x03+[^\x02\x03]\x03*[^\x02\x03]|\x03+[^\x02\x03]"
 )
+#: Where data go on with what an earlier transmission began: the next three bytes, of which one may
+#: be the trigger (the destination and the source at most are to come before it).
+_GOING_ON: Final = re.compile(rb"\x03*([^\x02\x03])?\x03*([^\x02\x03])?\x03*([^\x02\x03])?")
 #: STX may be repeated; the byte after the last one is the destination.
 _ADDRESSED: Final = re.compile(rb"\x02+([^\x02])")
 
@@ -43,6 +46,8 @@ class SacProtocol:
 
     def cuts(self, data: bytes) -> Sequence[int]:
         """The ends of all trigger bytes but one that ends the data itself."""
+        if data[0] != STX:
+            return _cuts_going_on(data)
         first = data.find(b"\x03")
         if first < 0:
             return ()
@@ -59,6 +64,8 @@ class SacProtocol:
         """
         if data[0] == STX and data.find(b"\x02", 1) < 0 and len(data) > 1:
             return EVERYONE if data[1] == GENERAL_CALL else (data[1],)
+        if data.find(b"\x02") < 0:
+            return ()
         if data[-1] == STX:
             return EVERYONE
         found = {hit[0] for hit in _ADDRESSED.findall(data)}
@@ -80,6 +87,15 @@ class SacProtocol:
                 return f"{_FAULTS[kind]}: {data.hex(' ')}"
             case _:
                 raise TypeError(f"not an event of the SAC decoder: {event!r}")
+
+
+def _cuts_going_on(data: bytes) -> list[int]:
+    """Cuts of data that may go on with a packet; and one at the byte that may put an answer off."""
+    going_on = _GOING_ON.match(data)
+    assert going_on is not None  # it matches nothing as well
+    ends = {1, *(going_on.end(group) for group in (1, 2, 3))}
+    ends.update(hit.end() for hit in _TRIGGER.finditer(data))
+    return sorted(end for end in ends if 0 < end < len(data))
 
 
 SAC_PROTOCOL: Final = SacProtocol()
