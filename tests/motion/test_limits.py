@@ -53,6 +53,13 @@ def limits(motion: Motion, drive: Drive = FACTORY, start: int = 0) -> set[Limit]
             id="linear 400 RPM, 47 us",
         ),
         pytest.param(command(9000, 400, 50, 50), Drive(ustep=4), 0, set(), id="harmonic 400 RPM"),
+        pytest.param(
+            command(9000, 100, 50, 50, linear=True),
+            Drive(ustep=4),
+            400,
+            {Limit.LINEAR},
+            id="linear down from 400 RPM",
+        ),
         # manual, "V": above 600 RPM better a cycle
         pytest.param(command(9000, 700), FACTORY, 0, {Limit.COARSE}, id="v700"),
         pytest.param(replace(command(9000, 700), cycle_us=430), FACTORY, 0, set(), id="vc430"),
