@@ -149,7 +149,10 @@ class Node(Contract):
         ...
 
     def wake(self, now: Ns) -> bytes | None:
-        """Do what is due, and give the bytes that the node begins to send at ``now``, if any."""
+        """Do what is due, and give the bytes that the node begins to send at ``now``, if any.
+
+        It may be called when nothing is due after all; then nothing happens.
+        """
         ...
 
     def snapshot(self, now: Ns) -> Snapshot:

@@ -77,6 +77,7 @@ class CommandProcessor:
         "_stopping",
         "_tell",
         "_untold",
+        "due",
         "session",
     )
 
@@ -111,6 +112,8 @@ class CommandProcessor:
         self._last_period = 0
         self._last_acc = (-1, -1, False)
         self._stopping = False
+        #: When the command that runs is over, or its start is to be told; None: never.
+        self.due: Ns | None = None
 
     @property
     def current(self) -> Motion | None:
@@ -127,25 +130,30 @@ class CommandProcessor:
         """Commands that wait for their turn, in order."""
         return [motion for at in self._pending if (motion := self._queue[at]) is not None]
 
-    def wake_at(self) -> Ns | None:
-        """When the command that runs is over, or its start is to be told."""
-        untold = self._untold
-        return self._engine.end if untold is None else untold
-
     def wake(self, now: Ns) -> None:
         """End the command that is over, and go on with the next."""
+        if self.due is None or self.due > now:
+            return
         if self._untold is not None and self._untold <= now:
             self._tell_start(self._untold)
         end = self._engine.end
         if end is not None and end <= now:
             self._finish(end)
             self._load_next(end)
+        self._see_what_is_due()
+
+    def _see_what_is_due(self) -> None:
+        self.due = self._engine.end if self._untold is None else self._untold
 
     def execute(self, command: MotionCommand, now: Ns) -> None:
         """Do what a command says, at ``now``."""
+        self._execute(command, now)
+        self._see_what_is_due()
+
+    def _execute(self, command: MotionCommand, now: Ns) -> None:
         match command:
             case Move():
-                self.move(command, now)
+                self._move(command, now)
             case Velocity():
                 self.session = self.session.with_velocity(command)
                 self._retarget(now)
@@ -167,7 +175,7 @@ class CommandProcessor:
             case _:
                 assert_never(command)
 
-    def move(self, move: Move, now: Ns) -> None:
+    def _move(self, move: Move, now: Ns) -> None:
         """M: the next queue position, or continuous motion at once."""
         motion, self.session = self.session.resolve(move)
         if motion.steps is None:

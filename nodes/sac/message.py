@@ -53,8 +53,8 @@ class MessageProcessor:
             self._tell_remarks(parsed)
         match command:
             case Move():
-                # First, and apart, because nearly all lines are this.
-                self._commands.move(command, now)
+                # First, because nearly all lines are this.
+                self._commands.execute(command, now)
             case None | Empty() | SoftOp():
                 pass
             case Forward(onward, rest):

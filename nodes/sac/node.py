@@ -72,7 +72,7 @@ class SacNode:
     def wake_at(self) -> Ns | None:
         """The next answer or packet to send, or the end of the command that runs."""
         sends = self._network.due
-        ends = self._commands.wake_at()
+        ends = self._commands.due
         if sends is None:
             return ends
         return sends if ends is None or sends < ends else ends

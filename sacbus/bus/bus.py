@@ -180,13 +180,11 @@ class _Routes:
             return
         seat.due = None
         node = seat.node
-        wanted = node.wake_at()
-        if wanted is not None and wanted <= when:
-            data = node.wake(when)
-            if data:
-                self.transmit(node, data)
-            if node.receiving:
-                self._open[seat] = None
-            elif self._open:
-                self._open.pop(seat, None)
+        data = node.wake(when)
+        if data:
+            self.transmit(node, data)
+        if node.receiving:
+            self._open[seat] = None
+        elif self._open:
+            self._open.pop(seat, None)
         self._appoint(seat)

@@ -177,13 +177,18 @@ class Medium:
         place = self._lanes[sent.lane]
         heard = None
         if sent.lane == 0:
-            heard = self._heard(sent, sent.to_nodes, upto)
+            first = sent.to_nodes
+            arrived = data[first:upto] if sent.hits is None else self._spoilt(sent, first, upto)
+            heard = Heard(arrived, sent.start, first, self.rate, data[upto:])
             self._router.deliver(heard, sent.sender, now)
         # Listeners hear whole frames: all cuts but the last, and the end. (What follows the last
         # cut of a single packet is its NUL; to hear that apart would only cost them.)
         if place.listeners and (upto == size or step < len(cuts) - 1):
             if heard is None or sent.to_listeners != sent.to_nodes:
-                heard = self._heard(sent, sent.to_listeners, upto)
+                first = sent.to_listeners
+                heard = Heard(
+                    self._spoilt(sent, first, upto), sent.start, first, self.rate, data[upto:]
+                )
             sent.to_listeners = upto
             for owner, listener in place.listeners:
                 if owner is not sent.sender:
@@ -199,10 +204,8 @@ class Medium:
         elif self._rest_matters(place, sent, upto):
             self.kernel.at(sent.end, self._arrive, sent)
 
-    def _heard(self, sent: Transmission, first: int, last: int) -> Heard:
-        return Heard(
-            sent.arrived(first, last, self._noise), sent.start, first, self.rate, sent.data[last:]
-        )
+    def _spoilt(self, sent: Transmission, first: int, last: int) -> bytes:
+        return sent.arrived(first, last, self._noise)
 
     def _rest_matters(self, place: _Lane, sent: Transmission, upto: int) -> bool:
         """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""

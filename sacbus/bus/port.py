@@ -65,8 +65,10 @@ class Port:
 
     def talk(self, data: bytes) -> None:
         """Bytes from outside, arriving now."""
+        if not data:
+            return
         self._buffer += data
-        if self._waiting or not self._buffer:
+        if self._waiting:
             return
         kernel = self._medium.kernel
         if kernel.now < self._until:
@@ -103,8 +105,9 @@ class Port:
                 self._waiting = True
                 kernel.at(earliest, self._start)
                 return
-        chunk = bytes(self._buffer[:CHUNK])
-        del self._buffer[:CHUNK]
+        buffer = self._buffer
+        chunk = bytes(buffer if len(buffer) <= CHUNK else buffer[:CHUNK])
+        del buffer[:CHUNK]
         self._until = medium.transmit(self, chunk, medium.master_lane).end
         if self._buffer:
             self._waiting = True
