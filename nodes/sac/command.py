@@ -147,7 +147,10 @@ class CommandProcessor:
 
     def execute(self, command: MotionCommand, now: Ns) -> None:
         """Do what a command says, at ``now``."""
-        self._execute(command, now)
+        if type(command) is Move:  # nearly all are, and this is much quicker than a match
+            self._move(command, now)
+        else:
+            self._execute(command, now)
         self._see_what_is_due()
 
     def _execute(self, command: MotionCommand, now: Ns) -> None:

@@ -39,7 +39,7 @@ class MessageProcessor:
 
     @property
     def line(self) -> str:
-        """The line that is being executed, for reports made meanwhile."""
+        """The last line that came, for reports made while it is executed."""
         return self._line.decode("latin-1")
 
     def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
@@ -51,10 +51,10 @@ class MessageProcessor:
         command = parsed.command
         if parsed.remarks:
             self._tell_remarks(parsed)
+        if type(command) is Move:  # nearly all are, and this is much quicker than a match
+            self._commands.execute(command, now)
+            return
         match command:
-            case Move():
-                # First, because nearly all lines are this.
-                self._commands.execute(command, now)
             case None | Empty() | SoftOp():
                 pass
             case Forward(onward, rest):
@@ -67,7 +67,6 @@ class MessageProcessor:
                 )
             case _:
                 self._commands.execute(command, now)
-        self._line = b""
 
     def _tell_remarks(self, parsed: Parsed) -> None:
         kind = ReportKind.REFUSED if parsed.command is None else ReportKind.WARNING

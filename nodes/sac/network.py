@@ -16,6 +16,7 @@ from sacbus.kernel import LineRate, Ns
 from sacbus.node import Heard, ReportKind
 from sacbus.wire import (
     GENERAL_CALL,
+    MAX_BODY,
     STX,
     DeviceReceiver,
     LineFault,
@@ -33,6 +34,14 @@ __all__ = ["NetworkPort"]
 ENABLE_LEAD: Final[Ns] = 8_000
 
 
+#: The device's times by body length: every packet asks for two of them.
+_SIZES: Final = range(MAX_BODY + 1)
+_AFTER_NUL: Final = [turnaround(size, nul_follows=True) for size in _SIZES]
+_AFTER_TRIGGER: Final = [turnaround(size, nul_follows=False) for size in _SIZES]
+_DEAF_AFTER_ANSWER: Final = [deaf_time(size, answered=True) for size in _SIZES]
+_DEAF_AFTER_BROADCAST: Final = [deaf_time(size, answered=False) for size in _SIZES]
+
+
 class NetworkPort:
     """Packets in, packets out.
 
@@ -44,6 +53,7 @@ class NetworkPort:
         "_accept",
         "_answer",
         "_answer_at",
+        "_answer_span",
         "_deaf",
         "_deaf_until",
         "_outbox",
@@ -76,6 +86,7 @@ class NetworkPort:
         self._turnaround = settings.turnaround
         self._deaf = settings.deaf_time
         self._rate = rate
+        self._answer_span = rate.span(ANSWER_BYTES)
         self._accept = accept
         self._tell = tell
         self._robust = settings.receiver == "robust"
@@ -157,7 +168,7 @@ class NetworkPort:
     def _busy_until(self) -> Ns:
         """When the answer that waits, or is on its way, is out, and a packet may follow."""
         if self._answer is not None:
-            return self._answer_at + self._rate.span(ANSWER_BYTES) + ENABLE_LEAD
+            return self._answer_at + self._answer_span + ENABLE_LEAD
         return self._sent_until
 
     def _packet(self, packet: Packet, heard: Heard, index: int) -> None:
@@ -175,11 +186,13 @@ class NetworkPort:
         limit = -1 if wrong else 1
         run = 0
         if not self._robust:
-            run = _run(heard.data[index:] + heard.following, limit)
-        replies = heard.ends(index - 1 + run)
+            come = heard.data[index:] + heard.following
+            run = 1 if come == b"\x00" else _run(come, limit)
+        handled = heard.ends(index - 1 + run) if run else triggered
+        replies = handled
         if self._turnaround:
             # With the robust receiver the NUL itself completed the packet.
-            replies += turnaround(size, nul_follows=run > 0 or self._robust)
+            replies += (_AFTER_NUL if run or self._robust else _AFTER_TRIGGER)[size]
         answered = self.ack and not general
         if answered:
             if wrong:
@@ -197,10 +210,10 @@ class NetworkPort:
             # Nothing to answer, but what it is told to send on takes as long to come.
             self._sent_until = max(self._sent_until, replies)
         if self._deaf:
-            handled = heard.ends(index - 1 + run)
             if answered:
-                handled = replies + self._rate.span(ANSWER_BYTES)
-            self._deaf_until = handled + deaf_time(size, answered=answered)
+                self._deaf_until = replies + self._answer_span + _DEAF_AFTER_ANSWER[size]
+            else:
+                self._deaf_until = handled + _DEAF_AFTER_BROADCAST[size]
         self._accept(packet.body, packet.src, packet.dest, triggered)
 
     def _put_off(self, heard: Heard, limit: int, size: int) -> None:
@@ -211,13 +224,13 @@ class NetworkPort:
             self._waits_for = None
             return
         was = self._answer_at
-        self._answer_at = heard.ends(run - 1) + turnaround(size, nul_follows=True)
+        self._answer_at = heard.ends(run - 1) + _AFTER_NUL[size]
         if limit > 0:
             self._waits_for = None
             if self._answer is None:
                 self._sent_until = max(self._sent_until, self._answer_at)
                 if self._deaf:
-                    self._deaf_until = heard.ends(run - 1) + deaf_time(size, answered=False)
+                    self._deaf_until = heard.ends(run - 1) + _DEAF_AFTER_BROADCAST[size]
             elif self._deaf:
                 self._deaf_until += self._answer_at - was
         elif run < len(bytes_come):
