@@ -56,7 +56,7 @@ class Bus:
             kernel,
             rate or protocol.rate,
             self._routes,
-            lanes=lanes or protocol.lanes,
+            lanes=protocol.lanes if lanes is None else lanes,
             seed=seed,
         )
         self._routes.transmit = self._transmit

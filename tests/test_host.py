@@ -1,0 +1,288 @@
+"""The three ways of moving the kernel's clock.
+
+A host in real time is tested on a loop in virtual time: its clock is then as exact as the claims.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from sacbus.host import RealHost, Standstill, VirtualHost, VirtualLoop, run_virtual
+from sacbus.kernel import MS, SECOND, US, Kernel, Ns
+from tests.nodes.sac.bench import NODE, Bench, Said, packet
+
+
+def beside(wall: Kernel, main: Callable[[asyncio.AbstractEventLoop], Awaitable[None]]) -> None:
+    """Run ``main`` on a loop whose wall clock is the kernel ``wall``."""
+
+    async def run() -> None:
+        await main(asyncio.get_running_loop())
+
+    run_virtual(wall, run())
+
+
+def nearly(moment: Ns, expected: Ns) -> bool:
+    """A timer in virtual time is a ns or so late, never early."""
+    return 0 <= moment - expected < US
+
+
+# ---- real and scaled ----------------------------------------------------------------------------
+
+
+def test_in_real_time_an_event_runs_when_the_clock_of_the_loop_says_so() -> None:
+    kernel = Kernel()
+
+    async def main() -> Ns:
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[Ns] = loop.create_future()
+        host = RealHost(kernel, loop)
+        kernel.at(3 * MS, lambda: done.set_result(kernel.now))
+        host.arrive(lambda: None)  # the event was made outside: the host looks again
+        when = await done
+        assert host.bus_now() >= 3 * MS
+        host.close()
+        return when
+
+    assert asyncio.run(main()) == 3 * MS
+
+
+@pytest.mark.parametrize(("speed", "bus_seconds"), [(1.0, 2), (10.0, 20), (0.5, 1)])
+def test_bus_time_is_the_clock_times_speed(speed: float, bus_seconds: int) -> None:
+    kernel = Kernel()
+    seen: list[Ns] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at(bus_seconds * SECOND // 2, lambda: seen.append(round(loop.time() * 1000)))
+        host = RealHost(kernel, loop, speed=speed)
+        await asyncio.sleep(2)
+        assert nearly(host.bus_now(), bus_seconds * SECOND)
+        host.close()
+
+    beside(Kernel(), main)
+    assert seen == [1000]
+
+
+@pytest.mark.parametrize("speed", [0, -1, float("nan")])
+def test_time_that_does_not_pass_is_refused(speed: float) -> None:
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        with pytest.raises(ValueError, match=r"speed: expected more than 0, got"):
+            RealHost(Kernel(), loop, speed=speed)
+
+    beside(Kernel(), main)
+
+
+def test_the_clock_may_stand_anywhere_when_the_host_begins() -> None:
+    kernel = Kernel(start=5 * SECOND)
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(kernel, loop)
+        assert host.bus_now() == 5 * SECOND
+        await asyncio.sleep(1)
+        assert nearly(host.bus_now(), 6 * SECOND)
+        host.close()
+
+    beside(Kernel(start=123 * SECOND), main)
+
+
+def test_what_comes_in_finds_bus_time_up_to_date() -> None:
+    kernel = Kernel()
+    seen: list[Ns] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(kernel, loop)
+        await asyncio.sleep(0.25)
+        assert kernel.now < 250 * MS  # nothing was due, so nobody moved the clock
+        host.arrive(lambda: seen.append(kernel.now))
+        host.close()
+
+    beside(Kernel(), main)
+    assert len(seen) == 1
+    assert nearly(seen[0], 250 * MS)
+
+
+def test_what_comes_in_may_bring_the_next_event_forward() -> None:
+    kernel = Kernel()
+    seen: list[int] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at(10 * SECOND, lambda: None)
+        host = RealHost(kernel, loop)
+        host.arrive(lambda: kernel.at(SECOND, lambda: seen.append(round(loop.time()))))
+        await asyncio.sleep(5)
+        host.close()
+
+    beside(Kernel(), main)
+    assert seen == [1]
+
+
+def test_a_late_awakening_delays_an_event_and_shifts_none() -> None:
+    wall, kernel = Kernel(), Kernel()
+    seen: list[tuple[Ns, Ns]] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        for when in (10 * MS, 20 * MS, 90 * MS):
+            kernel.at(when, lambda: seen.append((kernel.now, wall.now // MS * MS)))
+        host = RealHost(kernel, loop)
+        wall.run_until(50 * MS)  # as if the process had been away
+        await asyncio.sleep(1)
+        host.close()
+
+    beside(wall, main)
+    assert seen == [(10 * MS, 50 * MS), (20 * MS, 50 * MS), (90 * MS, 90 * MS)]
+
+
+def test_after_close_nothing_runs_and_closing_again_is_no_mistake() -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at(MS, ran.append, "event")
+        host = RealHost(kernel, loop)
+        host.close()
+        host.close()
+        host.arrive(ran.append, "arrival")
+        await asyncio.sleep(1)
+
+    beside(Kernel(), main)
+    assert ran == []
+
+
+# ---- running ahead ------------------------------------------------------------------------------
+
+
+def test_without_pace_an_answer_is_there_at_once_and_took_its_line_time() -> None:
+    bench = Bench()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(bench.kernel, loop, line_free_at=lambda: bench.bus.medium.free_at(0))
+        before = loop.time()
+        for _ in range(100):
+            host.arrive(bench.port.talk, packet("v100"))
+            host.arrive(lambda: bench.kernel.run_until(bench.kernel.now + 2 * MS))
+        assert len(bench.heard) == 100
+        assert loop.time() == before
+        host.close()
+
+    beside(Kernel(), main)
+    paced = Bench()
+    for number in range(2):
+        paced.sends(packet("v100"), at=bench.heard[number].at - bench.heard[0].at)
+        paced.run()
+    assert paced.heard == bench.heard[:2]
+
+
+def test_without_pace_motion_still_keeps_the_time_of_the_clock() -> None:
+    bench = Bench()
+    states: list[str] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(bench.kernel, loop, line_free_at=lambda: bench.bus.medium.free_at(0))
+        host.arrive(bench.port.talk, packet("m200v100a1d1"))
+        assert bench.answers == [bytes((2, 1, NODE, 6))]
+        # The manual's command takes 1.469 s from the end of its packet; the line took no time.
+        for wait in (0, 1.465, 0.005):
+            await asyncio.sleep(wait)
+            host.arrive(lambda: states.append(bench.node.snapshot(bench.kernel.now).state))
+        host.close()
+
+    beside(Kernel(), main)
+    assert states == ["ACCEL", "DECEL", "STANDBY"]
+
+
+# ---- virtual ------------------------------------------------------------------------------------
+
+
+def test_virtual_time_jumps_to_the_next_event_or_timer_whichever_comes_first() -> None:
+    kernel = Kernel()
+    seen: list[tuple[str, float]] = []
+
+    async def main() -> str:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        kernel.at(1500 * MS, lambda: seen.append(("event", loop.time())))
+        await asyncio.sleep(1)
+        seen.append(("timer", round(loop.time(), 6)))
+        await asyncio.sleep(3600)
+        seen.append(("timer", round(loop.time(), 6)))
+        return "done"
+
+    assert run_virtual(kernel, main()) == "done"
+    assert seen == [("timer", 1.0), ("event", 1.5), ("timer", 3601.0)]
+
+
+@pytest.mark.parametrize("seconds", [1e-9, 0.05, 0.1 + 0.2, 0.2 - 0.05, 1 / 3, 86_400.1])
+def test_a_timer_is_never_early_and_less_than_a_microsecond_late(seconds: float) -> None:
+    kernel = Kernel()
+
+    async def main() -> None:
+        await asyncio.sleep(seconds)
+
+    run_virtual(kernel, main())
+    assert nearly(kernel.now, int(seconds * SECOND))
+
+
+def test_an_event_wakes_the_coroutine_that_waits_for_it() -> None:
+    kernel = Kernel()
+
+    async def main() -> Ns:
+        done: asyncio.Future[Ns] = asyncio.get_running_loop().create_future()
+        kernel.at(7 * MS, lambda: done.set_result(kernel.now))
+        return await done
+
+    assert run_virtual(kernel, main()) == 7 * MS
+
+
+def test_waiting_for_what_nothing_will_ever_bring_is_an_error_and_not_a_hang() -> None:
+    async def main() -> None:
+        await asyncio.get_running_loop().create_future()
+
+    with pytest.raises(Standstill, match="virtual time stands still"):
+        run_virtual(Kernel(), main())
+
+
+def test_a_descriptor_that_becomes_ready_is_noticed_in_virtual_time() -> None:
+    async def main() -> bytes:
+        ours, theirs = socket.socketpair()
+        with ours, theirs:
+            ours.setblocking(False)
+            theirs.send(b"\x06")
+            return await asyncio.get_running_loop().sock_recv(ours, 1)
+
+    assert run_virtual(Kernel(), main()) == b"\x06"
+
+
+def test_what_arrives_at_a_virtual_host_is_taken_in_at_once() -> None:
+    kernel = Kernel()
+    host = VirtualHost(kernel)
+    seen: list[Ns] = []
+    kernel.run_until(5)
+    host.arrive(lambda: seen.append(kernel.now))
+    host.close()
+    host.close()
+    assert seen == [5]
+
+
+def test_a_virtual_run_is_the_same_every_time() -> None:
+    def run() -> tuple[list[object], list[Said]]:
+        bench = Bench(*range(10, 20))
+        host = VirtualHost(bench.kernel)
+
+        async def talk(address: int) -> None:
+            for number in range(5):
+                await asyncio.sleep(0.001 * address)
+                host.arrive(bench.port.talk, packet(f"m{number + 1}00v200", address))
+
+        async def main() -> None:
+            await asyncio.gather(*map(talk, range(10, 20)))
+            await asyncio.sleep(3)
+
+        run_virtual(bench.kernel, main())
+        return bench.transcript(), bench.heard
+
+    first, heard = run()
+    assert any(len(said.data) == 4 for said in heard)
+    assert run()[0] == first

@@ -1,0 +1,196 @@
+"""The event queue, the clock and the arithmetic of line time."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sacbus.kernel import MS, SECOND, US, Appointment, Kernel, LineRate
+
+RATES = st.builds(LineRate, st.integers(300, 2_000_000), st.sampled_from((10, 11)))
+COUNTS = st.integers(0, 300)
+
+
+# ---- line time ----------------------------------------------------------------------------------
+
+
+def test_a_byte_at_38400_baud_takes_ten_bits_and_260_microseconds() -> None:
+    assert LineRate().span(1) == 260_416
+    assert LineRate(38_400, bits=11).span(1) == 286_458
+
+
+def test_the_line_time_of_a_run_is_truncated_once_and_not_per_byte() -> None:
+    rate = LineRate()
+    assert rate.span(3) == 781_250 > 3 * rate.span(1)
+    assert rate.span(38_400) == 10 * SECOND
+
+
+@given(RATES, COUNTS)
+def test_the_line_time_is_that_of_exact_arithmetic_for_short_and_long_runs(
+    rate: LineRate, count: int
+) -> None:
+    assert rate.span(count) == int(Fraction(count * rate.bits * SECOND, rate.baud))
+
+
+@given(RATES, COUNTS, st.integers(-2, 2))
+def test_bytes_begun_are_those_whose_start_bit_lies_before_the_moment(
+    rate: LineRate, count: int, off: int
+) -> None:
+    moment = rate.span(count) + off
+    expected = sum(rate.span(index) < moment for index in range(count + 3))
+    assert rate.bytes_begun(moment) == expected
+
+
+# ---- events -------------------------------------------------------------------------------------
+
+
+def test_a_kernel_starts_where_it_is_told_with_nothing_due() -> None:
+    kernel = Kernel(start=7 * MS)
+    assert (kernel.now, kernel.next_at(), kernel.run_next(), kernel.run()) == (
+        7 * MS,
+        None,
+        False,
+        0,
+    )
+    assert kernel.now == 7 * MS
+
+
+def test_events_find_the_clock_at_their_own_time() -> None:
+    kernel = Kernel()
+    seen: list[tuple[str, int]] = []
+    for name, when in (("late", 30), ("early", 10), ("middle", 20)):
+        kernel.at(when, lambda name: seen.append((name, kernel.now)), name)
+    assert kernel.run_until(25) == 2
+    assert seen == [("early", 10), ("middle", 20)]
+    assert kernel.now == 25
+    assert kernel.run() == 1
+    assert seen[-1] == ("late", 30)
+    assert kernel.now == 30
+
+
+def test_an_event_at_the_very_limit_runs() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+    kernel.at(10, ran.append, 1)
+    assert kernel.run_until(9) == 0
+    assert kernel.run_until(10) == 1
+
+
+def test_events_of_one_instant_run_in_the_order_in_which_they_were_scheduled() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+    for number in range(50):
+        kernel.at(5, ran.append, number)
+    kernel.run()
+    assert ran == list(range(50))
+
+
+def test_a_time_that_has_passed_means_now_and_the_clock_never_goes_back() -> None:
+    kernel = Kernel()
+    kernel.run_until(100)
+    seen: list[int] = []
+    kernel.at(20, lambda: seen.append(kernel.now))
+    assert kernel.next_at() == 100
+    kernel.run_until(50)
+    assert (seen, kernel.now) == ([], 100)
+    kernel.run_until(100)
+    assert (seen, kernel.now) == ([100], 100)
+
+
+def test_events_that_events_schedule_run_in_the_same_go_if_they_are_due() -> None:
+    kernel = Kernel()
+    seen: list[int] = []
+
+    def again(left: int) -> None:
+        seen.append(kernel.now)
+        if left:
+            kernel.at(kernel.now + 10, again, left - 1)
+
+    kernel.at(0, again, 9)
+    assert kernel.run_until(45) == 5
+    assert seen == [0, 10, 20, 30, 40]
+    assert kernel.next_at() == 50
+    assert kernel.run() == 5
+
+
+def test_a_cancelled_event_neither_runs_nor_counts_nor_is_next() -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+    first = kernel.at(10, ran.append, "first")
+    kernel.at(20, ran.append, "second")
+    kernel.cancel(first)
+    kernel.cancel(first)
+    assert kernel.next_at() == 20
+    assert kernel.run() == 1
+    assert ran == ["second"]
+    assert kernel.ran == 1
+
+
+def test_cancelling_what_has_run_is_no_mistake() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+    done = kernel.at(10, ran.append, 1)
+    kernel.run()
+    kernel.cancel(done)
+    assert ran == [1]
+
+
+def test_an_event_may_cancel_one_of_its_own_instant() -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+    later: list[Appointment] = []
+    kernel.at(10, lambda: kernel.cancel(later[0]))
+    later.append(kernel.at(10, ran.append, "never"))
+    kernel.run()
+    assert ran == []
+
+
+def test_the_next_instant_runs_whole_and_no_further() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+    for when in (10, 10, 20):
+        kernel.at(when, ran.append, when)
+    assert kernel.run_next()
+    assert (ran, kernel.now) == ([10, 10], 10)
+
+
+def test_an_error_comes_out_and_leaves_the_clock_at_its_event_and_the_rest_due() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+
+    def break_down() -> None:
+        raise ZeroDivisionError
+
+    kernel.at(10, break_down)
+    kernel.at(20, ran.append, 20)
+    with pytest.raises(ZeroDivisionError):
+        kernel.run_until(50)
+    assert (kernel.now, kernel.ran) == (10, 1)
+    kernel.run_until(50)
+    assert (ran, kernel.now, kernel.ran) == ([20], 50, 2)
+
+
+@given(st.lists(st.tuples(st.integers(0, 40), st.booleans())), st.lists(st.integers(0, 50)))
+def test_whatever_is_scheduled_runs_by_time_and_then_by_order(
+    events: list[tuple[int, bool]], stops: list[int]
+) -> None:
+    kernel = Kernel()
+    ran: list[tuple[int, int]] = []
+    for number, (when, cancelled) in enumerate(events):
+        appointment = kernel.at(when, lambda n, w: ran.append((w, n)), number, when)
+        if cancelled:
+            kernel.cancel(appointment)
+    clocks = []
+    for stop in stops:
+        kernel.run_until(stop)
+        clocks.append(kernel.now)
+    kernel.run()
+    assert ran == sorted((when, at) for at, (when, cancelled) in enumerate(events) if not cancelled)
+    assert clocks == sorted(clocks)
+
+
+def test_units_are_nanoseconds() -> None:
+    assert (US, MS, SECOND) == (10**3, 10**6, 10**9)
