@@ -165,10 +165,10 @@ class Caller:
         until its answer is in or overdue, but it is not sent again.
         """
         for request in self._waiting:
-            if request.done is done:
+            if request.done == done:
                 self._waiting.remove(request)
                 return
-        if self._outstanding is not None and self._outstanding.done is done:
+        if self._outstanding is not None and self._outstanding.done == done:
             self._outstanding.withdrawn = True
 
     def hear(self, data: bytes) -> None:

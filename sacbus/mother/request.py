@@ -23,7 +23,7 @@ _UNSAFE: Final = re.compile(b"[%b]" % bytes(_UNSAFE_BYTES)).search
 
 
 def safe_body(body: bytes) -> bytes:
-    """``body`` with as many trailing spaces (0 to 2) as give it a CRC that every device checks.
+    """``body``, with a trailing space if it needs one for a CRC that every device checks.
 
     A space ends a command, and what follows it is ignored, so nothing else changes. The empty body
     is left alone (its CRC is 00, and a space would make it a message). :class:`BadRequest` for
@@ -36,11 +36,11 @@ def safe_body(body: bytes) -> bytes:
             "end or break the packet; leave it out"
         )
     sent = body
-    while crc8(sent) in _UNSAFE_CRCS and body:
+    if crc8(body) in _UNSAFE_CRCS and body:
+        # One always cures: a space after a body turns its CRC from 00, 02, 03 into 23, 9F, C1.
         sent += b" "
     if len(sent) > MAX_BODY:
-        spaces = len(sent) - len(body)
-        needs = f" and {spaces} trailing space(s) for its CRC" if spaces else ""
+        needs = " and a trailing space for its CRC" if len(sent) > len(body) else ""
         raise BadRequest(
             f"line {body.decode('latin-1')!r}: expected at most {MAX_BODY} characters, got "
             f"{len(body)}{needs}; split it"
