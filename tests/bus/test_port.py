@@ -1,0 +1,185 @@
+"""Outside bytes: when they get on the line, and who gets them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from sacbus.bus import LATENCY, Bus, Port, Transmission
+from sacbus.kernel import MS, SECOND, US, Kernel, Ns
+from sacbus.node import Heard
+from tests.nodes.sac.bench import NODE, Bench, packet
+
+ACK = bytes((2, 1, NODE, 6))
+
+
+class Desk:
+    """A port of its own on a bench's line, what it heard, and all that went over the line."""
+
+    def __init__(self, bench: Bench, *, latency: Ns = LATENCY, echo: bool = False) -> None:
+        self.heard: list[tuple[Ns, bytes]] = []
+        self.port = Port(bench.bus.medium, self._hear, latency=latency, echo=echo)
+        self.sent: list[Transmission] = []
+        bench.bus.medium.watchers.append(self._watch)
+
+    def _hear(self, heard: Heard, now: Ns) -> None:
+        self.heard.append((now, heard.data))
+
+    def _watch(self, sent: Transmission) -> None:
+        if sent.sender is self.port:
+            self.sent.append(sent)
+
+    @property
+    def data(self) -> bytes:
+        return b"".join(data for _, data in self.heard)
+
+    @property
+    def starts(self) -> list[Ns]:
+        return [sent.start for sent in self.sent]
+
+
+def test_on_an_idle_line_bytes_start_at_once() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    bench.kernel.run_until(3 * MS)
+    desk.port.talk(packet("v100"))
+    assert desk.port.unsent == 0
+    bench.run()
+    assert desk.starts == [3 * MS]
+    assert desk.data == ACK
+
+
+def test_saying_nothing_is_no_transmission() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    desk.port.talk(b"")
+    bench.run()
+    assert bench.bus.medium.counters().transmissions == 0
+
+
+def test_what_comes_in_while_the_port_sends_follows_without_a_pause() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    desk.port.talk(b"\x02ABC")
+    bench.kernel.run_until(500 * US)
+    desk.port.talk(b"DE")
+    desk.port.talk(b"F")
+    assert desk.port.unsent == 3
+    bench.run()
+    assert [sent.data for sent in desk.sent] == [b"\x02ABC", b"DEF"]
+    assert desk.starts == [0, bench.span(4)]
+    assert bench.bus.medium.counters().collided == 0
+
+
+def test_what_comes_in_as_the_last_byte_ends_follows_without_a_pause_too() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    desk.port.talk(b"\x02ABC")
+    bench.kernel.at(bench.span(4), desk.port.talk, b"D")
+    bench.run()
+    assert desk.starts == [0, bench.span(4)]
+
+
+def test_after_an_answer_a_port_starts_no_sooner_than_its_latency() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    desk.port.talk(packet("v100"))
+    # As a quick program would: the next request in the very moment of the answer.
+    answered: list[Ns] = []
+
+    def reply(sent: Transmission) -> None:
+        if sent.sender is not desk.port and len(answered) < 3:
+            answered.append(sent.end)
+            desk.port.talk(packet("v100"))
+
+    bench.bus.medium.watchers.append(reply)
+    bench.run()
+    assert desk.starts[1:] == [end + 1 * MS for end in answered]
+    assert desk.data == ACK * 4
+    assert bench.bus.medium.counters().collided == 0
+
+
+def test_with_another_latency_the_pause_is_another() -> None:
+    bench = Bench()
+    desk = Desk(bench, latency=123 * US)
+    bench.sends(b"\x02A", at=0)
+    desk.port.talk(b"\x02B")
+    bench.run()
+    assert desk.starts == [bench.span(2) + 123 * US]
+
+
+def test_two_programs_that_are_paced_do_not_run_into_each_other() -> None:
+    bench = Bench()
+    first, second = Desk(bench), Desk(bench)
+    first.port.talk(packet("v100"))
+    bench.kernel.run_until(100 * US)
+    second.port.talk(packet("v200"))
+    bench.run()
+    # The second one waits through the first one's answer as well.
+    assert second.starts[0] >= first.sent[0].end + LATENCY
+    assert bench.bus.medium.counters().collided == 0
+    assert first.data == ACK + packet("v200") + ACK
+
+
+def test_a_long_stream_goes_out_without_a_pause_and_takes_its_line_time() -> None:
+    bench = Bench(lanes=2)
+    desk = Desk(bench)
+    data = bytes(range(0x40, 0x60)) * 1_000
+    desk.port.talk(data)
+    bench.run()
+    assert b"".join(sent.data for sent in desk.sent) == data
+    assert all(one.end == other.start for one, other in pairwise(desk.sent))
+    # Each piece is truncated to the ns.
+    assert 0 <= len(data) * 10 * SECOND // 38_400 - bench.kernel.now < len(desk.sent)
+
+
+def test_a_port_hears_its_own_bytes_only_with_echo() -> None:
+    for echo in (False, True):
+        bench = Bench()
+        desk = Desk(bench, echo=echo)
+        assert desk.port.echo is echo
+        desk.port.talk(packet("v100"))
+        bench.run()
+        assert desk.data == (packet("v100") if echo else b"") + ACK
+
+
+def test_on_two_lanes_nobody_hears_the_programs_bytes() -> None:
+    bench = Bench(lanes=2)
+    speaker, other = Desk(bench, echo=True), Desk(bench)
+    speaker.port.talk(packet("v100"))
+    bench.run()
+    assert speaker.data == other.data == ACK
+
+
+def test_what_is_dropped_is_counted_and_never_sent() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    desk.port.talk(b"\x02ABC")
+    desk.port.talk(b"DEF")
+    assert desk.port.drop() == 3
+    assert desk.port.unsent == 0
+    bench.run()
+    assert [sent.data for sent in desk.sent] == [b"\x02ABC"]
+
+
+def test_a_closed_port_finishes_what_it_sends_and_hears_no_more() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    desk.port.talk(packet("v100"))
+    desk.port.talk(packet("v200"))
+    desk.port.close()
+    desk.port.close()
+    bench.run()
+    assert [sent.data for sent in desk.sent] == [packet("v100")]
+    assert desk.heard == []
+    assert bench.answers == [packet("v100"), ACK]
+
+
+def test_ports_on_lines_without_nodes_need_nothing_else() -> None:
+    kernel = Kernel()
+    heard: list[bytes] = []
+    bus = Bus(kernel, Bench().bus.protocol)
+    one = Port(bus.medium, lambda piece, now: heard.append(piece.data))
+    Port(bus.medium, lambda piece, now: heard.append(piece.data))
+    one.talk(b"\x02A")
+    kernel.run()
+    assert heard == [b"\x02A"]
