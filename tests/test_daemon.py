@@ -1,0 +1,406 @@
+"""Buses built from a configuration: in virtual and in real time, and taken down again."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from random import Random
+from typing import Any, TypeVar
+
+import pytest
+import serial
+
+from sacbus import open_bus
+from sacbus.daemon import Configuration, HostedBus
+from sacbus.host import run_virtual
+from sacbus.kernel import MS, SECOND, Kernel
+from sacbus.links import MemoryLink, PathTaken
+from sacbus.node import KindError, SettingError
+from sacbus.state import StateDirectory, StateError
+from sacbus.wire import encode
+
+_T = TypeVar("_T")
+
+ACK_10 = bytes.fromhex("02 01 0a 06")
+
+
+def virtually(scene: Coroutine[Any, Any, _T]) -> _T:
+    return run_virtual(Kernel(), scene)
+
+
+async def until(condition: Callable[[], object]) -> None:
+    """Let the loop turn until it holds; the time-out exists only to fail."""
+    async with asyncio.timeout(30):
+        while not condition():  # noqa: ASYNC110 (a bus in real time has no event to wait on)
+            await asyncio.sleep(0)
+
+
+# ------------------------------------------------------------------------ virtual time
+
+
+def test_a_bus_opens_with_three_nodes_by_default() -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            assert [(one.address, one.kind, one.state) for one in bus.snapshots()] == [
+                (10, "sac", "STANDBY"),
+                (11, "sac", "STANDBY"),
+                (12, "sac", "STANDBY"),
+            ]
+            assert bus.links == []
+            assert bus.bus.rate.baud == 38_400
+            with pytest.raises(KeyError, match="no node 99 on bus"):
+                bus.snapshot(99)
+
+    virtually(scene())
+
+
+def test_ten_minutes_of_motion_are_over_at_once_and_exact() -> None:
+    async def scene() -> float:
+        async with open_bus() as bus:
+            await bus.mother().send(10, "mv100")  # continuous, 333⅓ steps a second
+            await asyncio.sleep(600)
+            return bus.snapshot(10).position_steps
+
+    assert virtually(scene()) == virtually(scene()) == pytest.approx(200_000, rel=1e-3)
+
+
+def test_the_same_configuration_gives_the_same_bytes_at_the_same_times() -> None:
+    def trace(seed: int) -> list[tuple[int, bytes, bytes]]:
+        found: list[tuple[int, bytes, bytes]] = []
+
+        async def scene() -> None:
+            async with open_bus(Configuration(nodes=(10, 11), seed=seed)) as bus:
+                bus.bus.medium.watchers.append(
+                    lambda one: found.append(
+                        (one.start, one.data, one.arrived(0, len(one.data), Random(0)))
+                    )
+                )
+                link = MemoryLink()
+                bus.attach(link)
+                mother = bus.mother()
+                client = link.client()
+                call = asyncio.create_task(mother.send(10, "V100"))
+                await asyncio.sleep(0.001)
+                # A stranger on the medium itself talks over mother.
+                bus.bus.medium.transmit("stranger", b"\x55", 0)
+                await call
+                client.write(encode(11, 1, b"m400"))
+                await asyncio.sleep(1)
+
+        virtually(scene())
+        return found
+
+    assert len(trace(1)) >= 5
+    assert trace(1) == trace(1)
+    assert trace(1) != trace(2)
+
+
+def test_a_client_on_a_link_is_answered_with_the_lines_times() -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            link = MemoryLink()
+            bus.attach(link)
+            heard: list[tuple[int, bytes]] = []
+            kernel = bus.host.kernel
+            client = link.client(lambda data: heard.append((kernel.now, data)))
+            client.write(encode(10, 1, b"m400"))
+            await asyncio.sleep(10)
+            assert heard == [(2_604_166 + 385_000 + 1_041_666, ACK_10)]
+            assert bus.links == [link]
+            assert bus.snapshot(10).position_steps == 400
+
+    virtually(scene())
+
+
+def test_echo_gives_a_client_its_own_bytes_back() -> None:
+    async def scene(*, echo: bool) -> bytes:
+        async with open_bus(Configuration(echo=echo)) as bus:
+            link = MemoryLink()
+            bus.attach(link)
+            client = link.client()
+            client.write(encode(10, 1, b"m400"))
+            await asyncio.sleep(10)
+            return client.read()
+
+    assert virtually(scene(echo=False)) == ACK_10
+    assert virtually(scene(echo=True)) == encode(10, 1, b"m400") + ACK_10
+
+
+def test_on_two_lanes_master_and_nodes_talk_at_once_unharmed() -> None:
+    async def scene(lanes: int) -> int:
+        async with open_bus(Configuration(lanes=lanes)) as bus:
+            mother = bus.mother()
+            call = asyncio.create_task(mother.send(10, "V100"))
+            await asyncio.sleep(0.0035)  # the ACK is on its way
+            bus.bus.medium.transmit("stranger", b"\x55", bus.bus.medium.master_lane)
+            await call
+            return mother.statistics[10].sent
+
+    assert virtually(scene(1)) == 2
+    assert virtually(scene(2)) == 1
+
+
+def test_a_broken_line_on_one_bus_costs_another_of_the_same_loop_nothing() -> None:
+    exchange = 2_604_166 + 385_000 + 1_041_666
+
+    async def scene() -> None:
+        noise = Random(0).randbytes(30_000)
+        async with (
+            open_bus(Configuration(name="A")) as good,
+            open_bus(Configuration(name="B")) as bad,
+        ):
+            link = MemoryLink()
+            bad.attach(link)
+            link.client().write(noise)
+            mother = good.mother()
+            for _ in range(500):
+                answer = await mother.send(10, "V100")
+                assert (answer.attempts, answer.round_trip) == (1, exchange)
+            assert bad.bus.medium.counters().bytes > 8_000
+            assert good.bus.medium.counters().collided == 0
+            assert good.bus.report_counts.total() == 0
+
+    virtually(scene())
+
+
+def test_mother_starts_as_soon_as_the_line_is_free() -> None:
+    async def scene() -> int:
+        async with open_bus() as bus:
+            bus.bus.medium.transmit("stranger", b"\x55\x55", 0)
+            return (await bus.mother().send(10, "V100")).round_trip
+
+    assert virtually(scene()) == 520_833 + 2_604_166 + 385_000 + 1_041_666
+
+
+# ----------------------------------------------------------------- what it refuses to open
+
+
+@pytest.mark.parametrize(
+    ("configuration", "error", "what"),
+    [
+        (Configuration(kind="toaster"), KindError, "'toaster' is not installed"),
+        (Configuration(settings={"ustep": 9}), SettingError, "whole number from 0 to 7, got 9"),
+        (Configuration(settings={"colour": 1}), SettingError, "setting 'colour'"),
+        (Configuration(state=Path("/dev/null/x")), StateError, "cannot create the state directory"),
+        (Configuration(pty=Path("/dev/null")), PathTaken, "/dev/null"),
+    ],
+)
+def test_what_cannot_be_opened_is_told_in_one_line(
+    configuration: Configuration, error: type[Exception], what: str
+) -> None:
+    async def scene() -> None:
+        async with open_bus(configuration):
+            pass
+
+    with pytest.raises(error, match=what) as told:
+        asyncio.run(scene())
+    assert "\n" not in str(told.value)
+
+
+# -------------------------------------------------------------------------------- memory
+
+
+def test_memory_is_saved_when_the_bus_closes_and_obeyed_when_it_opens(tmp_path: Path) -> None:
+    async def opened(configuration: Configuration) -> float:
+        async with open_bus(configuration) as bus:
+            await bus.mother().send(10, "m400")
+            await asyncio.sleep(0.5)
+            return bus.snapshot(10).position_pulses
+
+    microsteps = Configuration(nodes=(10,), settings={"ustep": 2}, state=tmp_path)
+    first = virtually(opened(microsteps))
+    stored = json.loads((tmp_path / "bus" / "10").read_text())
+    assert stored["kind"] == "sac"
+    assert stored["memory"]["ustep"] == 2
+    # What is stored wins over the configuration's factory values.
+    assert virtually(opened(Configuration(nodes=(10,), state=tmp_path))) == first
+    assert virtually(opened(Configuration(nodes=(10,)))) < first
+
+
+def test_memory_is_saved_when_the_scene_fails_too(tmp_path: Path) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10, 11), state=tmp_path)):
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        virtually(scene())
+    assert sorted(path.name for path in (tmp_path / "bus").iterdir()) == ["10", "11"]
+
+
+def test_a_bus_that_could_not_open_saves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "port").touch()
+    configuration = Configuration(state=tmp_path / "state", pty=tmp_path / "port")
+
+    async def scene() -> None:
+        async with open_bus(configuration):
+            pass
+
+    with pytest.raises(PathTaken):
+        asyncio.run(scene())
+    assert list((tmp_path / "state" / "bus").iterdir()) == []
+
+
+def test_a_memory_that_cannot_be_saved_is_told_and_the_others_are_saved(tmp_path: Path) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(state=tmp_path)):
+            (tmp_path / "bus" / "10").mkdir()
+            (tmp_path / "bus" / "10" / "something").touch()
+
+    with pytest.raises(StateError, match="cannot write node memory"):
+        virtually(scene())
+    assert (tmp_path / "bus" / "11").is_file()
+    assert (tmp_path / "bus" / "12").is_file()
+
+
+def test_the_stored_address_wins_and_the_difference_is_told(tmp_path: Path) -> None:
+    StateDirectory(tmp_path, "bus").save(10, "sac", {"d_id": 77})
+
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10, 11), state=tmp_path)) as bus:
+            assert [one.address for one in bus.snapshots()] == [77, 11]
+            (report,) = bus.bus.reports
+            assert report.address == 10
+            assert "77" in report.text
+            assert "wins over the configured" in report.text
+            assert (await bus.mother().send(77, "m400")).node == 77
+            with pytest.raises(TimeoutError):
+                await bus.mother().send(10, "V100")
+
+    virtually(scene())
+    # Its memory stays where the configuration looks for it.
+    assert json.loads((tmp_path / "bus" / "10").read_text())["memory"]["d_id"] == 77
+    assert not (tmp_path / "bus" / "77").exists()
+
+
+def test_a_damaged_memory_is_told_and_the_node_starts_as_new(tmp_path: Path) -> None:
+    (tmp_path / "bus").mkdir()
+    (tmp_path / "bus" / "11").write_text("worn")
+
+    async def scene() -> None:
+        async with open_bus(Configuration(state=tmp_path)) as bus:
+            (report,) = bus.bus.reports
+            assert report.address == 11
+            assert "kept as 11.damaged, factory values used" in report.text
+            assert (await bus.mother().send(11, "m400")).node == 11
+
+    virtually(scene())
+    assert (tmp_path / "bus" / "11.damaged").read_text() == "worn"
+
+
+def test_without_a_state_directory_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    async def scene() -> None:
+        async with open_bus() as bus:
+            await bus.mother().send(10, "m400")
+
+    virtually(scene())
+    assert list(tmp_path.iterdir()) == []
+
+
+# ----------------------------------------------------------------------------- real time
+
+
+def test_in_real_time_a_scaled_bus_runs_as_much_faster() -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(speed=100)) as bus:
+            clock, kernel = asyncio.get_running_loop().time, bus.host.kernel
+            link = MemoryLink()
+            bus.attach(link)
+            client = link.client()
+            begun_after = clock()
+            client.write(encode(10, 1, b"m400"))
+            begun, begun_before = kernel.now, clock()
+            await until(lambda: bus.snapshot(10).position_steps == 400)
+            ended_after = clock()
+            bus.snapshot(10)
+            passed, ended_before = (kernel.now - begun) / SECOND, clock()
+            # Between readings of the clock on both sides, whatever the machine does meanwhile.
+            assert passed <= 100 * (ended_before - begun_after) + 1e-6
+            assert passed >= 100 * (ended_after - begun_before) - 1e-6
+            assert client.read() == ACK_10
+
+    asyncio.run(scene())
+
+
+def test_without_pace_answers_come_before_their_line_time_is_over() -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(pace=False)) as bus:
+            link = MemoryLink()
+            bus.attach(link)
+            client = link.client()
+            # 20 exchanges are 150 ms on the line; here each is over before the next line of code.
+            for _ in range(20):
+                client.write(encode(10, 1, b"V100 as before"))
+                assert client.read() == ACK_10
+            assert bus.host.kernel.now > 20 * 6 * MS
+
+    asyncio.run(scene())
+
+
+def test_mother_works_in_real_time_too() -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            assert (await bus.mother().send(10, "m400")).attempts == 1
+            await bus.mother().broadcast("m1")
+            await until(lambda: bus.snapshot(10).state == "CRUISE")
+
+    asyncio.run(scene())
+
+
+@pytest.mark.slow
+def test_250_nodes_answer_a_round_over_a_pty_each_ack_from_the_right_one() -> None:
+    addresses = range(4, 254)
+
+    def round_of(port: serial.Serial) -> list[bytes]:
+        answers = []
+        for address in addresses:
+            port.write(encode(address, 1, b"V100"))
+            answers.append(port.read(4))
+        return answers
+
+    async def scene() -> None:
+        everybody = Configuration(nodes=tuple(addresses), pty=True, pace=False)
+        async with open_bus(everybody) as bus:
+            with serial.Serial(bus.links[0].where, 38_400, timeout=30) as port:
+                answers = await asyncio.to_thread(round_of, port)
+                assert answers == [bytes((2, 1, address, 6)) for address in addresses]
+                # A broadcast reaches all and nobody answers: the next bytes are to the next packet.
+                port.write(encode(0, 1, b"m5v1000"))
+                await until(lambda: all(node.position_steps == 5 for node in bus.snapshots()))
+                port.write(encode(200, 1, b"V100"))
+                assert await asyncio.to_thread(port.read, 4) == bytes((2, 1, 200, 6))
+                assert port.in_waiting == 0
+
+    asyncio.run(scene())
+
+
+def test_the_pty_and_its_symlink_are_gone_when_the_bus_closes(tmp_path: Path) -> None:
+    path = tmp_path / "port"
+
+    async def scene() -> str:
+        async with open_bus(Configuration(pty=path)) as bus:
+            assert bus.links[0].where == str(path)
+            assert path.is_symlink()
+            assert path.with_name("port.lock").is_file()
+            return str(path.readlink())
+
+    device = asyncio.run(scene())
+    assert list(tmp_path.iterdir()) == []
+    assert not Path(device).exists()
+
+
+def test_a_bus_that_is_closed_takes_nothing_in() -> None:
+    async def scene() -> HostedBus:
+        async with open_bus() as bus:
+            pass
+        bus.host.arrive(lambda: pytest.fail("called"))
+        bus.host.close()
+        return bus
+
+    assert asyncio.run(scene()).host.kernel.next_at() is None

@@ -1,0 +1,158 @@
+"""The live table is a function of snapshots; the screen redraws it in place."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sacbus.live import Screen, table
+from sacbus.node import Snapshot
+
+
+def a_node(
+    address: int = 10,
+    *,
+    state: str = "STANDBY",
+    steps: float = 0,
+    rpm: float = 0.0,
+    current: str = "",
+    pending: tuple[str, ...] = (),
+    acks: int = 0,
+    naks: int = 0,
+) -> Snapshot:
+    return Snapshot(
+        address=address,
+        kind="sac",
+        state=state,
+        position_steps=steps,
+        position_pulses=int(steps),
+        rpm=rpm,
+        current=current,
+        pending=pending,
+        counters={"packets": acks + naks, "ack": acks, "nak": naks},
+    )
+
+
+def test_a_table_shows_node_state_steps_speed_commands_and_counts() -> None:
+    busy = a_node(
+        state="CRUISE",
+        steps=137,
+        rpm=120.04,
+        current="m400v120",
+        pending=("m1", "m2"),
+        acks=3,
+        naks=1,
+    )
+    assert table([busy, a_node(11, steps=-400)], 100, 10) == [
+        "node  state        steps      RPM  current               pending             ACK   NAK",
+        "  10  CRUISE         137    120.0  m400v120              2: m1                 3     1",
+        "  11  STANDBY       -400      0.0                                              0     0",
+    ]
+
+
+def test_on_80_columns_commands_give_way_and_every_count_is_whole() -> None:
+    long = a_node(
+        current="m-4000000c3000.5a1.25d1.25", pending=("m123456789v100a1d1",), acks=12345, naks=9876
+    )
+    heading, row = table([long], 79, 10)
+    assert len(row) <= 79
+    assert heading.split()[-2:] == ["ACK", "NAK"]
+    assert row.split()[-2:] == ["12345", "9876"]
+    assert "m-4000000c300" in row
+    assert "…" in row
+
+
+def test_a_terminal_that_is_narrower_still_gets_lines_that_fit() -> None:
+    for columns in range(1, 100):
+        lines = table([a_node(current="m400v120")], columns, 10)
+        assert all(len(line) <= columns for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("steps", "shown"),
+    [(0, "0"), (400, "400"), (-0.5, "-0.5"), (1_234_567.0, "1234567"), (0.0078125, "0.0078125")],
+)
+def test_positions_are_exact_in_microsteps_too(steps: float, shown: str) -> None:
+    row = table([a_node(steps=steps)], 100, 10)[1]
+    assert row.split()[2] == shown
+
+
+def test_when_there_are_too_many_nodes_the_busy_ones_are_shown_in_order() -> None:
+    nodes = [a_node(address, state="STANDBY") for address in range(10, 30)]
+    nodes[7] = a_node(17, state="CRUISE")
+    nodes[19] = a_node(29, state="SYNC")
+    lines = table(nodes, 100, 5)
+    assert len(lines) == 5
+    assert [line.split()[:2] for line in lines[1:4]] == [
+        ["10", "STANDBY"],
+        ["17", "CRUISE"],
+        ["29", "SYNC"],
+    ]
+    assert lines[4] == "… and 17 more nodes"
+
+
+def test_as_many_nodes_as_lines_are_all_shown() -> None:
+    lines = table([a_node(address) for address in (10, 11, 12)], 100, 4)
+    assert [line.split()[0] for line in lines] == ["node", "10", "11", "12"]
+
+
+def test_colour_stands_for_motion_and_changes_no_text() -> None:
+    nodes = [a_node(10, state="ACCEL"), a_node(11), a_node(12, state="DECEL")]
+    plain, coloured = table(nodes, 100, 10), table(nodes, 100, 10, colour=True)
+    assert [re.sub(r"\x1b\[\d*m", "", line) for line in coloured] == plain
+    assert ["\x1b[" in line for line in coloured] == [False, True, False, True]
+
+
+def test_a_table_of_no_nodes_is_its_heading() -> None:
+    assert len(table([], 100, 10)) == 1
+
+
+class Terminal:
+    """What a terminal shows of the few things that a screen sends; the cursor is at the end."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def write(self, text: str) -> None:
+        for up, rest in re.findall(r"(?:\x1b\[(\d+)A\x1b\[J)?([^\x1b]*)", text):
+            if up:
+                assert int(up) <= len(self.lines), "the cursor leaves the screen"
+                del self.lines[len(self.lines) - int(up) :]
+            self.lines += rest.splitlines()
+
+
+def test_lines_are_drawn_in_place_of_the_last_ones() -> None:
+    screen, terminal = Screen(), Terminal()
+    terminal.write("connect to /tmp/sacbus\n")
+    for lines in (["a", "b"], ["c", "d"], ["e"], ["f", "g", "h"]):
+        terminal.write(screen.draw(lines))
+        assert terminal.lines == ["connect to /tmp/sacbus", *lines]
+
+
+def test_nothing_is_written_when_nothing_has_changed() -> None:
+    screen = Screen()
+    assert screen.draw(["a"]) != ""
+    assert screen.draw(["a"]) == ""
+    assert screen.draw(["b"]) != ""
+
+
+@given(
+    st.lists(
+        st.one_of(st.text("xyz", max_size=3), st.lists(st.text("abc", min_size=1), max_size=4))
+    )
+)
+def test_reports_stay_above_and_the_table_below(happens: list[str | list[str]]) -> None:
+    screen, terminal = Screen(), Terminal()
+    reports: list[str] = []
+    drawn: list[str] = []
+    for one in happens:
+        if isinstance(one, str):
+            terminal.write(screen.above(f"report {one}"))
+            reports.append(f"report {one}")
+        else:
+            terminal.write(screen.draw(one))
+            drawn = one
+    assert terminal.lines == reports + drawn
