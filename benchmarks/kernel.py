@@ -53,4 +53,6 @@ def bare_heap() -> int:
 def figures(rounds: int) -> list[Figure]:
     """Events per second."""
     took, baseline = alternate(kernel_events, bare_heap, rounds)
-    return [Figure("kernel events", EVENTS / took, "events/s", baseline / took, "a bare heapq loop")]
+    return [
+        Figure("kernel events", EVENTS / took, "events/s", baseline / took, "a bare heapq loop")
+    ]

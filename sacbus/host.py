@@ -7,8 +7,8 @@ host says so.
 - *Real* (:class:`RealHost`): bus time follows the loop's clock, times ``speed``, against one
   absolute anchor, so that a late wake-up delays one event and never shifts those that follow. It is
   as precise as the loop it runs on. With ``ahead`` the line does not wait for the clock.
-- *Virtual* (:class:`VirtualLoop`): an event loop whose clock *is* the kernel's. When nothing else is
-  ready it jumps to the next event or timer. The same run, every time, as fast as it computes.
+- *Virtual* (:class:`VirtualLoop`): an event loop whose clock *is* the kernel's. When nothing else
+  is ready it jumps to the next event or timer. The same run every time, as fast as it computes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["Host", "RealHost", "Standstill", "VirtualHost", "VirtualLoop", "run_
 _T = TypeVar("_T")
 
 #: Without pace, bus time runs ahead until the line has been quiet for this long: longer than any
-#: turnaround (0.92 ms) and link latency (1 ms), so that answers come before the clock is waited for.
+#: turnaround (0.92 ms) and link latency (1 ms), so that no answer waits for the clock.
 _QUIET: Final[Ns] = 2 * MS
 
 
@@ -134,8 +134,7 @@ class Standstill(RuntimeError):
     """Virtual time cannot go on: coroutines wait, and nothing on the bus or the loop is due."""
 
 
-class _VirtualSelector(selectors.DefaultSelector):  # type: ignore[misc, valid-type]
-    # The base is chosen by typeshed per platform; that is the error ignored above.
+class _VirtualSelector(selectors.DefaultSelector):
     """Instead of waiting, moves the kernel. Descriptors are looked at, never waited for."""
 
     kernel: Kernel

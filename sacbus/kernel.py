@@ -1,9 +1,9 @@
 """The event queue and the only clock of the core, and the units of time.
 
 Owns *when* things happen on the bus: one heap of (time, order, callback) in integer nanoseconds of
-bus time; and what a byte takes on a line. Knows neither asyncio nor the wall clock; ``host.py`` runs it in real, scaled or virtual
-time. Everything below (medium, nodes, mother's transactions) is plain synchronous code that is
-called from here and asks for its next appointment here.
+bus time; and what a byte takes on a line. Knows neither asyncio nor the wall clock; ``host.py``
+runs it in real, scaled or virtual time. Everything below (medium, nodes, mother's transactions) is
+plain synchronous code that is called from here and asks for its next appointment here.
 
 Rules for whoever edits this file: events of one instant run in the order in which they were
 scheduled, on every machine and in every run; ``now`` never goes back; nothing here may ask what
@@ -29,7 +29,7 @@ SECOND: Final = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class LineRate:
-    """How long bytes take on a line: ``bits`` a byte (10 for 8N1, 11 with a ninth bit) at ``baud``."""
+    """How long bytes take: ``bits`` each (10 for 8N1, 11 with a ninth bit) at ``baud``."""
 
     baud: int = 38_400
     bits: int = 10
@@ -135,7 +135,7 @@ class Kernel:
         return True
 
     def run(self) -> int:
-        """Run until nothing is due. Returns how many events ran. (Endless motion never ends.)"""
+        """Run until nothing is due, which never comes while motion is endless; events run."""
         before = self.ran
         while self.run_next():
             pass

@@ -13,7 +13,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 from typing import Protocol as Contract
 
@@ -36,8 +36,8 @@ __all__ = [
     "Snapshot",
     "find_kind",
     "kinds",
-    "settings_from",
     "setting_list",
+    "settings_from",
 ]
 
 GROUP: Final = "sacbus.nodes"
@@ -163,7 +163,7 @@ class Node(Contract):
         """The contents of its EEPROM."""
         ...
 
-    def restore(self, memory: Mapping[str, int]) -> None:
+    def restore(self, memory: Mapping[str, object]) -> None:
         """Start with this EEPROM, as after a cold boot. Unknown or odd values are reported."""
         ...
 
@@ -213,7 +213,10 @@ class Protocol(Contract):
 
 @dataclass(frozen=True)
 class NodeSettings:
-    """Base of a kind's settings: a frozen dataclass whose fields carry :func:`setting` metadata."""
+    """Base of a kind's settings: a frozen dataclass, each field with ``help`` in its metadata.
+
+    Whole numbers carry ``low`` and ``high`` there, words their ``choices``; flags need no more.
+    """
 
 
 class NodeKind(Contract):
@@ -240,10 +243,13 @@ class NodeKind(Contract):
         ...
 
     def create(
-        self, address: int, settings: Any, rate: LineRate, tell: Callable[[Report], None]
+        self,
+        address: int,
+        settings: Any,  # noqa: ANN401 (an instance of the kind's own settings)
+        rate: LineRate,
+        tell: Callable[[Report], None],
     ) -> Node:
-        """A new node with factory memory. ``settings`` is an instance of :attr:`settings` (``Any``
-        because each kind has a type of its own); ``tell`` takes what it reports out of band."""
+        """A new node with factory memory; ``tell`` takes what it reports out of band."""
         ...
 
 
@@ -253,9 +259,8 @@ class KindError(LookupError):
 
 def kinds() -> dict[str, NodeKind]:
     """All installed kinds by name, sorted. A broken one raises :class:`KindError` naming it."""
-    return {
-        entry.name: _load(entry) for entry in sorted(entry_points(group=GROUP), key=lambda e: e.name)
-    }
+    entries = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    return {entry.name: _load(entry) for entry in entries}
 
 
 def find_kind(name: str) -> NodeKind:
@@ -268,8 +273,7 @@ def find_kind(name: str) -> NodeKind:
     raise KindError(f"node kind {name!r} is not installed; installed kinds: {have}")
 
 
-def _load(entry: Any) -> NodeKind:
-    # Any: importlib.metadata's EntryPoint is not generic in what it loads.
+def _load(entry: EntryPoint) -> NodeKind:
     try:
         kind: NodeKind = entry.load()
     except Exception as fault:  # a third party's import may fail in any way; we name it and pass on
@@ -297,24 +301,21 @@ class SettingError(ValueError):
 def setting_list(model: type[NodeSettings]) -> list[Setting]:
     """The settings of a kind in the order of their declaration."""
     return [
-        Setting(
-            field.name, field.default, _allowed(field.metadata, field.default), field.metadata["help"]
-        )
-        for field in dataclasses.fields(model)
+        Setting(one.name, one.default, _allowed(one.metadata, one.default), one.metadata["help"])
+        for one in dataclasses.fields(model)
     ]
 
 
 def settings_from(model: type[NodeSettings], given: Mapping[str, object]) -> NodeSettings:
-    """Settings checked against their model; :class:`SettingError` for the first that does not fit."""
+    """Settings checked against their model; SettingError for the first that does not fit."""
     fields = {field.name: field for field in dataclasses.fields(model)}
     for name, value in given.items():
         field = fields.get(name)
         if field is None:
             raise SettingError(f"setting {name!r}: expected one of {', '.join(fields)}")
         if not _fits(field.metadata, field.default, value):
-            raise SettingError(
-                f"setting {name!r}: expected {_allowed(field.metadata, field.default)}, got {value!r}"
-            )
+            allowed = _allowed(field.metadata, field.default)
+            raise SettingError(f"setting {name!r}: expected {allowed}, got {value!r}")
     return model(**given)
 
 

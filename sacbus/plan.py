@@ -22,7 +22,7 @@ from sacbus.language import (
 )
 from sacbus.motion import TICKS_PER_US, Drive, Profile, gap_passes, load_ticks, plan
 
-__all__ = ["Planned", "PlanError", "as_json", "as_text", "plan_sequence"]
+__all__ = ["PlanError", "Planned", "as_json", "as_text", "plan_sequence"]
 
 
 class PlanError(ValueError):
@@ -87,8 +87,7 @@ def plan_sequence(
                 start = end + motion.wait_us * TICKS_PER_US
                 if planned:
                     seamless = kept and (
-                        not gap
-                        or gap_passes(start - end + load, planned[-1].profile.last_period)
+                        not gap or gap_passes(start - end + load, planned[-1].profile.last_period)
                     )
                     kept = kept if seamless else 0
                     if not seamless or motion.wait_us:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Final, assert_never
+from typing import Final, Protocol, assert_never
 
 from nodes.sac.engine import TICK, Engine
 from sacbus.kernel import Ns
@@ -28,7 +28,7 @@ from sacbus.language import (
     Stop,
     Velocity,
 )
-from sacbus.motion import Drive, gap_passes, load_ticks, plan
+from sacbus.motion import Drive, Rpm, gap_passes, load_ticks, plan
 from sacbus.node import ReportKind
 
 __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand"]
@@ -50,12 +50,18 @@ MotionCommand = (
 )
 
 
+class SoftOps(Protocol):
+    """Tells the network that a command starts or ends."""
+
+    def __call__(self, *, start: bool, at: Ns) -> Ns:
+        """Have it told at ``at`` or as soon after as may be; when that will be out."""
+        ...
+
+
 class CommandProcessor:
     """Executes commands on an engine.
 
-    ``soft_ops(start, at)``, when they are on, is told when a command starts (True) and ends, and
-    gives back when that has been sent and the node is free again; None when they are off. ``tell``
-    takes what is worth a report.
+    ``soft_ops`` is None when they are off. ``tell`` takes what is worth a report.
     """
 
     __slots__ = (
@@ -86,7 +92,7 @@ class CommandProcessor:
         session: Session,
         drive: Drive,
         engine: Engine,
-        soft_ops: Callable[[bool, Ns], Ns] | None,
+        soft_ops: SoftOps | None,
         tell: Callable[[ReportKind, str], None],
     ) -> None:
         self.session = session
@@ -107,7 +113,7 @@ class CommandProcessor:
         #: When the node is free to load: now, or when its DC2 is out.
         self._free: Ns = 0
         self._gap = True
-        self._kept_rpm = 0
+        self._kept_rpm: Rpm = 0
         self._last_end: Ns = 0
         self._last_period = 0
         self._last_acc = (-1, -1, False)
@@ -196,7 +202,7 @@ class CommandProcessor:
         self._load_next(now)
 
     def _preempt(self, motion: Motion, now: Ns) -> None:
-        """Continuous motion goes before all that is pending; what runs is cut, its velocity kept."""
+        """Continuous motion goes before what is pending; what runs is cut, its velocity kept."""
         self._held = None
         self._preempting = motion
         self._cut(now)
@@ -262,12 +268,12 @@ class CommandProcessor:
         if self._soft_ops is not None:
             if self._untold is not None:
                 self._tell_start(self._untold)
-            self._free = self._soft_ops(False, end)
+            self._free = self._soft_ops(start=False, at=end)
             # The packet outlasts the gap (manual, "ops/soft_ops").
             self._kept_rpm = 0
 
     def _cut(self, now: Ns) -> None:
-        """End what runs with its present pulse, keeping its velocity (N, and what pre-empts)."""
+        """End what runs with its present pulse, keeping its velocity (N, and what preempts)."""
         if self._engine.profile is None:
             return
         if now < self._engine.started:
@@ -284,7 +290,7 @@ class CommandProcessor:
     def _tell_start(self, at: Ns) -> None:
         self._untold = None
         if self._soft_ops is not None:
-            self._soft_ops(True, at)
+            self._soft_ops(start=True, at=at)
 
     def _slow_down(self, dec100: int, linear: bool, now: Ns) -> None:
         if now < self._engine.started:

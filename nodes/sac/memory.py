@@ -82,8 +82,8 @@ class Memory:
     crc: int = 1
     full_step: int = 1
 
-    def restored(self, stored: Mapping[str, int]) -> tuple[Memory, list[str]]:
-        """This memory with what was stored put in, and a sentence for each value not taken as is."""
+    def restored(self, stored: Mapping[str, object]) -> tuple[Memory, list[str]]:
+        """This memory with what was stored put in; a sentence for each value not taken as is."""
         remarks: list[str] = []
         taken: dict[str, int] = {}
         for name, value in stored.items():

@@ -127,13 +127,13 @@ class NetworkPort:
                 if start < size and self._deaf_until > heard.start:
                     start = max(start, heard.begun_before(self._deaf_until))
             elif type(event) is LineFault:
-                self._tell(ReportKind.LOST, f"packet of {len(event.data)} bytes: body over 46 bytes")
+                self._tell(ReportKind.LOST, f"a packet whose body is over {MAX_BODY} bytes")
             # An ACK is of no consequence to a SAC: it sends nothing that it would repeat.
         self.receiving = self._receiver.open or self._waits_for is not None
         self._see_what_is_due()
 
     def send(self, dest: int, body: bytes, not_before: Ns) -> Ns:
-        """Queue a packet of the node's own; when it will have been sent, if nothing comes between."""
+        """Queue a packet of the node's own; when it will be out, if nothing comes between."""
         data = encode(dest, self.address, body, crc=self.crc)
         begins = max(not_before, self._busy_until())
         self._outbox.append((not_before, data))
@@ -238,7 +238,7 @@ class NetworkPort:
 
 
 def _run(data: bytes, limit: int) -> int:
-    """How many bytes of ``data`` put an answer off: up to the next STX, ``limit`` at most if > 0."""
+    """How many bytes of ``data`` put an answer off: up to the next STX, ``limit`` if > 0."""
     stx = data.find(STX)
     run = len(data) if stx < 0 else stx
     return min(run, limit) if limit > 0 else run

@@ -106,7 +106,7 @@ class SacNode:
         """The EEPROM's contents."""
         return self._memory.stored()
 
-    def restore(self, memory: Mapping[str, int]) -> None:
+    def restore(self, memory: Mapping[str, object]) -> None:
         """Boot with a stored EEPROM; the stored d_id wins over the configured address."""
         configured = self._memory.d_id
         restored, remarks = self._memory.restored(memory)
@@ -115,14 +115,14 @@ class SacNode:
         if restored.d_id != configured:
             self._tell(
                 ReportKind.WARNING,
-                f"EEPROM: stored d_id {restored.d_id} wins over the configured address {configured}",
+                f"EEPROM: d_id {restored.d_id} is stored and wins over the configured {configured}",
             )
         self._boot(restored)
 
     def _network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         self._messages.network_line(body, source, destination, now)
 
-    def _tell_ops(self, start: bool, at: Ns) -> Ns:
+    def _tell_ops(self, *, start: bool, at: Ns) -> Ns:
         """Soft ops tell everybody that a command starts or ends; when that will be out."""
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
@@ -131,7 +131,6 @@ class SacNode:
 
     def _tell_line(self, kind: ReportKind, text: str, line: str, column: int) -> None:
         self._tell_bus(Report(self._now, self.address, kind, text, line, column))
-
 
 
 def _short(motion: Motion) -> str:

@@ -19,9 +19,7 @@ __all__ = ["SAC_PROTOCOL", "SacProtocol"]
 
 #: The trigger: the first byte after ETX that is neither STX nor another ETX; and when the ETX came
 #: before the source, the first such byte after the source (spec, wire).
-_TRIGGER: Final = re.compile(
-    rb"\x02[^\x02\x03]\x03+[^\x02\x03]\x03*[^\x02\x03]|\x03+[^\x02\x03]"
-)
+_TRIGGER: Final = re.compile(rb"\x02[^\x02\x03]\x03+[^\x02\x03]\x03*[^\x02\x03]|\x03+[^\x02\x03]")
 #: Where data go on with what an earlier transmission began: the next three bytes, of which one may
 #: be the trigger (the destination and the source at most are to come before it).
 _GOING_ON: Final = re.compile(rb"\x03*([^\x02\x03])?\x03*([^\x02\x03])?\x03*([^\x02\x03])?")

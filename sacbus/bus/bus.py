@@ -79,7 +79,7 @@ class Bus:
             watcher(report)
 
     def add(self, node: Node) -> None:
-        """Put a node on the line. Two nodes of one address both hear and both answer, as on wires."""
+        """Put a node on the line. Two of one address both hear and both answer, as on wires."""
         self._routes.add(node)
 
     @property

@@ -154,10 +154,22 @@ def test_qualifiers_stand_in_any_order(steps: int, qualifiers: list[str]) -> Non
 
 
 @pytest.mark.parametrize(
+    ("line", "column", "got"),
+    [("m4294967296v100", 2, "4294967296"), ("m-99999999999", 3, "99999999999")],
+)
+def test_steps_beyond_32_bits_are_refused_for_without_them_the_motor_would_never_stop(
+    line: str, column: int, got: str
+) -> None:
+    parsed = parse(line)
+    assert parsed.command is None
+    (remark,) = parsed.remarks
+    assert (remark.column, remark.got) == (column, got)
+    assert remark.text == "the command is refused: without steps it never ends"
+
+
+@pytest.mark.parametrize(
     ("line", "move", "column", "consequence"),
     [
-        ("m4294967296v100", Move(rpm=100), 2, "it is ignored, so the motion is continuous"),
-        ("m-99999999999", Move(opposite=True), 3, "it is ignored, so the motion is continuous"),
         ("m5v4294967296a1", Move(5, acc100=100), 4, "the velocity is ignored"),
         ("m5v7vc4294967296", Move(5, rpm=7), 7, "the velocity is ignored"),
         ("m5v0", Move(5, rpm=BARE), 4, "the default cycle is used"),
