@@ -284,7 +284,8 @@ def _refuse_verb(line: Line) -> None:
     """Say of a line that no reader takes whether SAC, at least, would know it."""
     for start in (line.word[:2].upper(), line.word[0].upper()):
         if start in _NOT_YET:
-            name = line.word[:2] if start == "$" else start
+            # With its letter, unless that is none that can be shown.
+            name = line.word[:2] if start == "$" and line.word[:2].isprintable() else start
             got = f"{name} ({_NOT_YET[start]})"
             why = f"this version does not have it yet; {NOTHING}"
             line.remark(0, "a command of this version", got, why)
