@@ -147,6 +147,15 @@ def test_reports_are_json_lines_and_give_line_and_column() -> None:
         assert sacbus.read_event("stopped")["reports"] == {"refused": 1}
 
 
+def test_what_was_wrong_with_the_memory_is_told_once_it_serves(tmp_path: Path) -> None:
+    (tmp_path / "bus").mkdir()
+    (tmp_path / "bus" / "11").write_text("worn")
+    with served("--state", str(tmp_path)) as sacbus:
+        report = sacbus.read_event("report")
+        assert (report["node"], report["what"]) == (11, "warning")
+        assert "kept as 11.damaged" in report["text"]
+
+
 def test_without_a_terminal_there_are_plain_lines_and_no_control_characters() -> None:
     with started("serve", "--ephemeral", "--nodes", "10,12-14") as sacbus:
         text = sacbus.read_until(lambda text: "Ctrl-C ends it\n" in text)
@@ -158,6 +167,7 @@ def test_without_a_terminal_there_are_plain_lines_and_no_control_characters() ->
         assert sacbus.send_signal(signal.SIGINT) == 130
         assert "\\x1b[2J bell \\x07" in sacbus.text
         assert "\x1b" not in sacbus.text
+        assert "\x07" not in sacbus.text
         assert sacbus.text.endswith("stopped; port closed\n")
 
 
@@ -251,6 +261,8 @@ def test_reports_stand_above_the_table() -> None:
         exchange(link, encode(10, 1, b"?4"), ACK_10)
         sacbus.read_until(lambda text: "refused in '?4'" in text.split("connect to")[1])
         assert sacbus.send_signal(signal.SIGTERM) == 0
+        # The last drawing is of the end, however short a time after the one before.
+        assert rows(sacbus.text, 10)[-1] == ["10", "STANDBY", "0", "0.0", "1", "0"]
 
 
 def test_more_nodes_than_the_terminal_has_lines_never_scroll_it() -> None:
