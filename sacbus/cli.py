@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import os
 import sys
 import traceback
 from collections.abc import Callable, Sequence
@@ -404,6 +403,7 @@ def run(arguments: list[str]) -> int:
     """Run a command; its exit status. Errors that users can do something about are one line.
 
     Any other exception comes out with its traceback: it is a defect of ours, and worth a report.
+    When whoever read our output has left (head, less), click ends the process with status 1.
     """
     from sacbus.mother import MotherError
     from sacbus.node import KindError, SettingError
@@ -416,11 +416,6 @@ def run(arguments: list[str]) -> int:
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         return INTERRUPTED
-    except BrokenPipeError:
-        # Whoever read our output has left (head, less), and nobody is left to tell. What is still
-        # buffered must not fail once more at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
     except (MotherError, KindError, SettingError) as fault:
         text = str(fault.args[0]) if isinstance(fault, KindError) else str(fault)
         return _failed(text, 1, verbose)
