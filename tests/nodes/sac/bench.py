@@ -12,7 +12,7 @@ from nodes.sac import KIND, SacNode, SacSettings
 from sacbus.bus import Bus, Port, Transmission
 from sacbus.kernel import Kernel, LineRate, Ns
 from sacbus.node import Heard, Report, ReportKind, Snapshot
-from sacbus.wire import MOTHER, encode
+from sacbus.wire import ETX, MOTHER, NUL, STX, crc8, encode
 
 __all__ = ["EVEN", "LOAD", "LOAD_ACC", "NODE", "Bench", "Said", "packet"]
 
@@ -84,8 +84,14 @@ class Bench:
         return medium.transmit(sender or self.port, data, medium.master_lane)
 
     def hears(self, line: str | bytes, *, at: Ns, to: int = NODE) -> None:
-        """A line in a packet of mother's whose trigger byte ends at ``at``."""
-        data = packet(line, to)
+        """A line in a packet of mother's whose trigger byte ends at ``at``.
+
+        As mother does, with a space behind it where the device would lose it or not check it.
+        """
+        body = line.encode("latin-1") if isinstance(line, str) else line
+        while crc8(body) in (NUL, STX, ETX):
+            body += b" "
+        data = packet(body, to)
         self.sends(data, at=at - self.span(len(data) - 1))
         self.kernel.run_until(at)
 
