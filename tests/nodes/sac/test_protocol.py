@@ -1,0 +1,151 @@
+"""What the bus must know of the SAC network, held against the receivers that it speaks for."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from nodes.sac.protocol import SAC_PROTOCOL
+from sacbus.node import EVERYONE
+from sacbus.wire import (
+    Answer,
+    DeviceReceiver,
+    Fault,
+    LineFault,
+    Packet,
+    PacketReceiver,
+    Verdict,
+    ack,
+    encode,
+    nak,
+)
+from tests.bus.strategies import bursts
+from tests.nodes.sac.bench import NODE
+
+PACKET = encode(NODE, 1, b"m200")
+
+
+def test_it_is_one_pair_of_wires_at_38400_baud() -> None:
+    assert (SAC_PROTOCOL.name, SAC_PROTOCOL.lanes) == ("sac", 1)
+    assert (SAC_PROTOCOL.rate.baud, SAC_PROTOCOL.rate.bits) == (38_400, 10)
+
+
+@pytest.mark.parametrize(
+    ("data", "cuts"),
+    [
+        (PACKET, [9]),
+        (PACKET[:-1], []),
+        (ack(1, NODE), []),
+        (PACKET + PACKET, [9, 19]),
+        (encode(NODE, 1, b"m200", crc=False), []),
+        (encode(NODE, 1, b"a\x03\x00b"), [6, 9]),
+        # ETX before the source: the byte after the source is the trigger.
+        (b"\x02\x52\x03\x01\x41\x41", [5]),
+        (b"\x02\x52\x01\x03\x03\x03\xa5\x00", [7]),
+        # What goes on with an earlier transmission: STX, destination and source may have been in
+        # it, and its first byte may put an answer off.
+        (b"\xa5\x00", [1]),
+        (b"\x03\xa5\x00", [1, 2]),
+        (b"\x52\x03\x01\x03\xa5\x41\x41", [1, 3, 5]),
+        (b"abcdef", [1, 2, 3]),
+        (b"\x03\x03", [1]),
+        (b"\x00" + PACKET, [1, 10]),
+    ],
+)
+def test_a_node_may_have_to_act_at_the_end_of_a_trigger_byte(data: bytes, cuts: list[int]) -> None:
+    assert list(SAC_PROTOCOL.cuts(data)) == cuts
+
+
+@pytest.mark.parametrize(
+    ("data", "addressed"),
+    [
+        (PACKET, [NODE]),
+        (encode(0, 1, b"m200"), EVERYONE),
+        (ack(1, NODE), [1]),
+        (b"A" + PACKET, [NODE]),
+        (PACKET + encode(10, 1, b""), [10, NODE]),
+        (PACKET + encode(0, 1, b""), EVERYONE),
+        (b"hello\x03\x00", []),
+        (b"\x02", EVERYONE),
+        (PACKET + b"\x02", EVERYONE),
+        (b"\x02\x02\x02\x0a", [10]),
+    ],
+)
+def test_those_are_addressed_for_whom_a_packet_opens(
+    data: bytes, addressed: list[int] | None
+) -> None:
+    found = SAC_PROTOCOL.addressed(data)
+    assert (found if found is None else list(found)) == addressed
+
+
+@given(st.binary(max_size=12), bursts)
+@example(b"\x02\x52\x01\x61\x03", b"\x41\x00\x41\x41")
+@example(b"\x02\x52\x03", b"\x01\x41\x41\x41")
+@example(b"\x02", b"\x52\x03\x01\x41\x41")
+def test_a_device_that_hears_at_the_cuts_acts_nowhere_else(before: bytes, data: bytes) -> None:
+    cuts = {*SAC_PROTOCOL.cuts(data), len(data)}
+    assert sorted(cuts) == [*SAC_PROTOCOL.cuts(data), len(data)]
+    receiver = DeviceReceiver(NODE)
+    at = 0
+    while (found := receiver.receive(before, at)) is not None:
+        at = found[1]
+    for index in range(len(data)):
+        found = receiver.receive(data[index : index + 1])
+        # An ACK seen, or a body too long, is nothing to act on.
+        if found is not None and isinstance(found[0], Packet):
+            assert index + 1 in cuts
+
+
+@given(bursts, st.sampled_from((NODE, 10, 5)))
+def test_a_receiver_that_is_not_addressed_is_idle_and_stays_so(data: bytes, address: int) -> None:
+    addressed = SAC_PROTOCOL.addressed(data)
+    receiver = DeviceReceiver(address)
+    found = receiver.receive(data)
+    if addressed is not EVERYONE and address not in addressed:
+        assert found is None
+        assert not receiver.open
+
+
+def test_its_decoder_is_the_robust_receiver() -> None:
+    decoder = SAC_PROTOCOL.decoder()
+    assert isinstance(decoder, PacketReceiver)
+    assert decoder.receive(PACKET) == [Packet(NODE, 1, b"m200", Verdict.RIGHT)]
+    assert SAC_PROTOCOL.decoder() is not decoder
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        (Answer(1, NODE, accepted=True), "82 -> 1: ACK"),
+        (Answer(1, NODE, accepted=False), "82 -> 1: NAK"),
+        (LineFault(Fault.NOISE, b"\x41\x00"), "noise: 41 00"),
+        (LineFault(Fault.CUT_SHORT, b"\x02"), "cut short: 02"),
+        (LineFault(Fault.BAD_CRC, b"\x02"), "wrong CRC: 02"),
+        (LineFault(Fault.NO_NUL, b"\x02"), "no NUL after the CRC: 02"),
+        (LineFault(Fault.TOO_LONG, b"\x02"), "too long: 02"),
+    ],
+)
+def test_events_are_described_in_words(event: object, words: str) -> None:
+    assert SAC_PROTOCOL.describe(event) == words
+
+
+def test_packets_are_described_by_who_says_what_to_whom() -> None:
+    (event,) = SAC_PROTOCOL.decoder().receive(PACKET)
+    described = SAC_PROTOCOL.describe(event)
+    assert described.startswith("1 -> 82: ")
+    assert "200" in described
+    to_all = SAC_PROTOCOL.describe(Packet(0, 1, b"S", Verdict.UNCHECKED))
+    assert to_all.startswith("1 -> all: ")
+    assert to_all.endswith(" (no CRC)")
+
+
+def test_what_is_no_event_of_this_network_is_a_mistake() -> None:
+    with pytest.raises(TypeError, match="not an event of the SAC decoder: 'ACK'"):
+        SAC_PROTOCOL.describe("ACK")
+
+
+@given(st.binary(max_size=100))
+def test_whatever_the_decoder_gives_can_be_described(data: bytes) -> None:
+    for event in SAC_PROTOCOL.decoder().receive(data + nak(1, NODE)):
+        assert SAC_PROTOCOL.describe(event)
