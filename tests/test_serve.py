@@ -17,9 +17,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+import serial
 
 from sacbus.wire import DC1, DC2, encode
-from tests.serving import Sacbus, client, served, started, until
+from tests.serving import PATIENCE, Sacbus, client, served, started, until
 
 pytestmark = pytest.mark.slow
 
@@ -53,6 +54,38 @@ def test_the_line_takes_its_time_when_paced() -> None:
             port.write(encode(10, 1, b"V100 as before"))
             assert port.read(4) == ACK_10
         assert time.monotonic() - before >= 50 * 0.006_751
+
+
+def test_without_pace_bus_time_runs_ahead_of_the_clock() -> None:
+    with served("--ephemeral", "--no-pace") as sacbus, client(sacbus.link) as port:
+
+        def refused_at(node: int) -> float:
+            port.write(encode(node, 1, b"?4"))
+            assert port.read(4) == bytes((2, 1, node, 6))
+
+            def found(text: str) -> list[float]:
+                events = [json.loads(line) for line in text.split("\n")[:-1]]
+                return [one["time_us"] / 1e6 for one in events if one.get("node") == node]
+
+            sacbus.read_until(found)
+            return found(sacbus.text)[0]
+
+        begun, before = time.monotonic(), refused_at(10)
+        port.write(b"\x55" * 40_000)
+        passed = refused_at(11) - before
+        assert passed > 40_000 * 10 / 38_400
+        assert passed > time.monotonic() - begun
+
+
+def test_options_reach_the_bus() -> None:
+    options = ("--echo", "--baud", "57600", "--receiver", "robust", "--nodes", "10")
+    with served("--ephemeral", *options) as sacbus:
+        assert sacbus.ready["baud"] == 57_600
+        with serial.Serial(sacbus.link, 57_600, timeout=PATIENCE) as port:
+            # Only a robust receiver hears m132, and only with echo does its sender.
+            packet = encode(10, 1, b"m132")
+            port.write(packet)
+            assert port.read(len(packet) + 4) == packet + ACK_10
 
 
 @pytest.mark.parametrize(
