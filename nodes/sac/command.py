@@ -339,8 +339,11 @@ class CommandProcessor:
     def _retarget(self, now: Ns) -> None:
         """A new session velocity re-targets continuous motion, with the session's acceleration."""
         current = self._current
-        if current is None or current.steps is not None or self._stopping:
+        profile = self._engine.profile
+        if current is None or current.steps is not None or profile is None:
             return
+        if profile.duration is not None:
+            return  # it is coming to its end: S, s, N, n or another command was heard
         session = self.session
         target = replace(
             current,
@@ -353,7 +356,7 @@ class CommandProcessor:
         if now < self._engine.started:
             started = self._engine.started
             self._engine.discard()
-            self._engine.start(plan(target, self._drive, self._kept_rpm), started)
+            self._engine.start(plan(target, self._drive, profile.start_rpm), started)
         else:
             self._engine.change(lambda profile, at: profile.retarget(at, target), now)
 

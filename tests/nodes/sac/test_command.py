@@ -547,13 +547,27 @@ def test_a_new_velocity_in_the_start_wait_of_continuous_motion_counts_from_its_s
     assert bench.position(start + 10 * STEP) == 11
 
 
-def test_a_motion_that_is_being_stopped_takes_no_new_velocity() -> None:
-    bench = Bench()
-    bench.hears("mv100", at=AT)
-    bench.hears("s", at=5 * SECOND)
-    there = bench.position(5 * SECOND)
+@pytest.mark.parametrize("line", ["s", "n", "N"])
+def test_a_motion_that_comes_to_its_end_takes_no_new_velocity(line: str) -> None:
+    bench, twin = Bench(), Bench()
+    for each in (bench, twin):
+        # At 1 RPM a step lasts 300 ms: long enough for another packet.
+        each.hears("mv1" if line == "N" else "mv100", at=AT)
+        each.hears(line, at=5 * SECOND)
     bench.hears("v200", at=5 * SECOND + 20 * MS)
-    assert settled(bench) == there + 90
+    assert settled(bench) == settled(twin)
+    assert bench.kernel.now == twin.kernel.now
+
+
+def test_a_velocity_that_the_gap_has_lost_does_not_come_back_with_a_new_one() -> None:
+    bench = Bench()
+    bench.hears("m10v100a999d999", at=AT)
+    bench.hears("a1", at=SECOND)
+    bench.hears("mt2000000", at=SECOND * 2)
+    bench.hears("v200", at=SECOND * 3)
+    times = pulse_times(bench, SECOND * 3, SECOND * 5)
+    assert times[0] == SECOND * 2 + LOAD_ACC + SECOND * 2
+    assert times[1] - times[0] == STEP
 
 
 # ---- GAP ----------------------------------------------------------------------------------------
