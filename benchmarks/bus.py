@@ -7,15 +7,18 @@ baseline is what the kernel must do at least: five bare heap events an exchange.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from functools import partial
 from itertools import count
 
 from benchmarks.figure import Figure, alternate
 from benchmarks.kernel import EVENTS, bare_heap
 from nodes.sac import KIND, SacSettings
 from sacbus.bus import Bus, Port
-from sacbus.kernel import SECOND, Kernel
-from sacbus.mother import Acknowledged, Caller
+from sacbus.kernel import SECOND, Kernel, Ns
+from sacbus.mother import Acknowledged, Caller, safe_body
+from sacbus.node import Heard
+from sacbus.wire import ACK, MOTHER, encode
+from sacbus.wire.times import MOTHER_GAP
 
 NODES = 250
 FIRST = 6
@@ -40,11 +43,38 @@ class FullBus:
             self.caller.broadcast(line, lambda _outcome: None)
         self.kernel.run()
 
-    def exchange(self, times: int, addresses: range, steps: int) -> None:
-        """``times`` commands, each sent when the one before is acknowledged.
+    def line(self, steps: int) -> bytes:
+        """A line unlike those before: ``steps`` to twice as many steps at 250 to 399 RPM."""
+        number = next(self.lines)
+        return b"m%dv%d" % (steps + number // 150 % steps, 250 + number % 150)
 
-        Lines are distinct: ``steps`` to twice as many steps at 250 to 399 RPM.
-        """
+    def packets(self, times: int, addresses: range, steps: int) -> None:
+        """``times`` commands as packets, each sent the gap after the ACK of the one before."""
+        kernel = self.kernel
+        packets = [
+            encode(addresses[number % len(addresses)], MOTHER, safe_body(self.line(steps)))
+            for number in range(times)
+        ]
+        packets.reverse()
+
+        def send() -> None:
+            port.talk(packets.pop())
+
+        def hear(heard: Heard, now: Ns) -> None:
+            dest, source, mark = heard.data[1:]
+            assert (dest, mark) == (MOTHER, ACK), heard
+            self.answers[source] += 1
+            if packets:
+                kernel.at(now + MOTHER_GAP, send)
+
+        port = Port(self.bus.medium, hear, latency=0)
+        send()
+        kernel.run_until(kernel.now + times * SECOND)
+        assert not packets, f"{len(packets)} packets were never sent: one was not acknowledged"
+        port.close()
+
+    def exchange(self, times: int, addresses: range, steps: int) -> None:
+        """The same through mother, who builds, sends, times and counts."""
         caller, answers = self.caller, self.answers
         left = times
 
@@ -57,9 +87,7 @@ class FullBus:
                 ask()
 
         def ask() -> None:
-            number = next(self.lines)
-            line = b"m%dv%d" % (steps + number // 150 % steps, 250 + number % 150)
-            caller.call(addresses[number % len(addresses)], line, done)
+            caller.call(addresses[left % len(addresses)], self.line(steps), done)
 
         ask()
         while left:
@@ -83,15 +111,17 @@ def figures(rounds: int) -> list[Figure]:
     """Packets per second, with all nodes in use and with most of them idle; broadcasts."""
     found = []
     events = EVENTS / (5 * EXCHANGES)
-    few = range(FIRST, FIRST + 10)
+    many, few = range(FIRST, FIRST + NODES), range(FIRST, FIRST + 10)
     # A node is asked again after 7 ms x the nodes in use: by then it is done with these commands.
     for name, nodes, addresses, acceleration, steps, goal in (
-        ("bus, 250 nodes, all of them busy", NODES, range(FIRST, FIRST + NODES), 10, 200, 150e3),
+        ("bus, 250 nodes, all of them busy", NODES, many, 10, 200, 150e3),
+        ("the same through mother", NODES, many, 10, 200, None),
         ("bus, 250 nodes, 240 of them idle", NODES, few, 400, 20, None),
         ("bus, 10 nodes, none of them idle", 10, few, 400, 20, None),
     ):
         full = FullBus(nodes, acceleration)
-        act = _exchanges(full, addresses, steps)
+        way = full.exchange if "mother" in name else full.packets
+        act = partial(way, EXCHANGES, addresses, steps)
         act()
         took, baseline = alternate(act, bare_heap, rounds)
         assert sum(full.answers.values()) == (rounds + 1) * EXCHANGES
@@ -120,7 +150,3 @@ def figures(rounds: int) -> list[Figure]:
         )
     )
     return found
-
-
-def _exchanges(full: FullBus, addresses: range, steps: int) -> Callable[[], None]:
-    return lambda: full.exchange(EXCHANGES, addresses, steps)

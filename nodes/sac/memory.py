@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
+from functools import lru_cache
 from typing import Final
 
 from sacbus.language import Defaults
@@ -56,6 +57,12 @@ _NOT_ZERO: Final[Mapping[str, int]] = {
     "l_acc": _NO_RAMP,
     "l_dec": _NO_RAMP,
 }
+
+
+@lru_cache(maxsize=256)
+def _drive(sprf: int, slow: int, ustep: int, ihd: int, xclk: int, pulse: int) -> Drive:
+    """One for all nodes that are alike: what is worked out for one then serves them all."""
+    return Drive(sprf=sprf, slow_rpm=slow, ustep=ustep, ihd=ihd, xclk=xclk, pulse_us=pulse)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,15 +128,8 @@ class Memory:
         )
 
     def drive(self) -> Drive:
-        """What the motion engine must know of the hardware."""
-        return Drive(
-            sprf=self.sprf,
-            slow_rpm=self.slow,
-            ustep=self.ustep,
-            ihd=self.ihd,
-            xclk=self.xclk,
-            pulse_us=self.pulse,
-        )
+        """What the motion engine must know of the hardware; the same object for the same values."""
+        return _drive(self.sprf, self.slow, self.ustep, self.ihd, self.xclk, self.pulse)
 
 
 assert {field.name for field in fields(Memory)} == set(_LARGEST)

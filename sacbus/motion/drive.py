@@ -55,6 +55,10 @@ class Drive:
     rate: int = field(init=False, repr=False, compare=False)
     slow_speed: int = field(init=False, repr=False, compare=False)
     offset: int = field(init=False, repr=False, compare=False)
+    # `plan`'s own memory of (n_acc, n_dec, ticks of both) by velocity, acc, dec and start velocity.
+    whole_ramps: dict[tuple[int, int, int, Rpm], tuple[int, int, int]] = field(
+        init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         if not 0 <= self.ustep <= USTEP_MAX:
@@ -69,6 +73,7 @@ class Drive:
         derive(self, "rate", TICKS_PER_MINUTE * 100 // self.steps_per_rev)
         derive(self, "slow_speed", self.speed(self.slow))
         derive(self, "offset", self.xclk - self.ihd + SERVICE_TICKS)
+        derive(self, "whole_ramps", {})
 
     def speed(self, rpm: Rpm) -> int:
         """An RPM in this room's integer unit; what does not fit the unit is cut off."""

@@ -5,11 +5,16 @@ the path of every command of every node: the usual one is looked up and not laid
 Source: manual, "Profile Planning", "Profiles"; spec, "Profile".
 """
 
+from typing import Final
+
 from sacbus.language import Motion
 from sacbus.motion.drive import NO_RAMP, Drive, Rpm
 from sacbus.motion.harmonic import harmonic
 from sacbus.motion.profile import Profile
 from sacbus.motion.shares import Shares, harmonic_steps, linear_steps, truncate
+
+_REMEMBERED: Final = 4096
+"""Pairs of ramps kept a drive; beyond it all are forgotten, which costs a microsecond each."""
 
 
 def plan(motion: Motion, drive: Drive, start_rpm: Rpm = 0) -> Profile:
@@ -18,12 +23,30 @@ def plan(motion: Motion, drive: Drive, start_rpm: Rpm = 0) -> Profile:
     start_rpm: RPM kept from the command before, 0 = from rest. The start wait and sync are the
     node's: tick 0 is the first pulse. ValueError for negative steps.
     """
+    steps = motion.steps
+    known = None
+    key = (motion.rpm, motion.acc100, motion.dec100, start_rpm)
+    if not (steps is None or motion.linear or motion.pulses):
+        known = drive.whole_ramps.get(key)
+        if known is not None:
+            n_acc, n_dec, ramps = known
+            cruise = steps - n_acc - n_dec
+            if cruise >= 0:
+                extra, m = motion.extra_pulses, drive.m
+                shares = Shares(
+                    n_acc, cruise, n_dec, extra, m, accelerates=n_acc > 0, truncated=False
+                )
+                duration = ramps + (cruise * m + extra) * drive.cruise_period(motion.cycle_us)
+                kept = motion.rpm if motion.dec100 >= NO_RAMP else 0
+                return Profile(motion, drive, start_rpm, shares, duration, kept)
     shares = share_out(motion, drive, start_rpm)
     ends_at_speed = motion.steps is not None and motion.dec100 >= NO_RAMP
     kept = motion.rpm if ends_at_speed else 0
     if not motion.linear and shares.cruise is not None:
         duration = _harmonic_duration(motion, drive, start_rpm, shares)
         if duration >= 0:
+            if known is None and not (shares.truncated or motion.pulses):
+                _remember(key, drive, shares, duration, motion)
             return Profile(motion, drive, start_rpm, shares, duration, kept)
     return Profile.laid_out(motion, drive, start_rpm, shares, kept)
 
@@ -62,6 +85,16 @@ def share_out(motion: Motion, drive: Drive, start_rpm: Rpm) -> Shares:
         )
     kept_acc, kept_dec = truncate(n_acc, n_dec, steps)
     return Shares(kept_acc, 0, kept_dec, 0, unit, accelerates=n_acc > 0, truncated=True)
+
+
+def _remember(
+    key: tuple[int, int, int, Rpm], drive: Drive, shares: Shares, duration: int, motion: Motion
+) -> None:
+    """Keep what both whole ramps take: the next command of these speeds differs in its cruise."""
+    cruised = (shares.cruise_pulses or 0) * drive.cruise_period(motion.cycle_us)
+    if len(drive.whole_ramps) >= _REMEMBERED:
+        drive.whole_ramps.clear()
+    drive.whole_ramps[key] = (shares.acc, shares.dec, duration - cruised)
 
 
 def _harmonic_duration(motion: Motion, drive: Drive, start_rpm: Rpm, shares: Shares) -> int:
