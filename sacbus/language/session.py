@@ -176,7 +176,9 @@ class Session:
     def with_velocity(self, velocity: Velocity) -> Session:
         """After ``V``: RPM and cycle follow each other, the one given is exact."""
         rpm, cycle_us = self._velocity(velocity.rpm, velocity.cycle_us)
-        return replace(self, rpm=rpm, cycle_us=cycle_us)
+        return _make_session(
+            rpm, cycle_us, self.acc100, self.dec100, self.linear, self.full_step, self.defaults
+        )
 
     def with_acceleration(self, acceleration: Acceleration) -> Session:
         """After ``A``; bare brings back the system default of the present ramp."""
