@@ -64,12 +64,8 @@ def root(context: click.Context) -> int | None:
     return USAGE_STATUS
 
 
-def _addresses(
-    _ctx: click.Context, _param: click.Parameter, given: str | tuple[int, ...]
-) -> tuple[int, ...]:
+def _addresses(_ctx: click.Context, _param: click.Parameter, given: str) -> tuple[int, ...]:
     """``10-19,85``: addresses and ranges of them, in the order given, each once."""
-    if isinstance(given, tuple):
-        return given
     found: list[int] = []
     for part in given.split(","):
         first, dash, last = (word.strip() for word in part.partition("-"))
