@@ -10,13 +10,13 @@ import asyncio
 from collections.abc import AsyncIterator, Mapping
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
+from random import Random
 
 from sacbus.bus import Bus, Port
 from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
 from sacbus.kernel import Kernel, LineRate
-from sacbus.links import Link, PtyLink
+from sacbus.links import Link, PtyLink, Tuning
 from sacbus.mother import Mother
 from sacbus.node import Heard, NodeKind, Report, ReportKind, Snapshot, find_kind, settings_from
 from sacbus.state import StateDirectory, StateError
@@ -72,12 +72,21 @@ class HostedBus:
 
     def attach(self, link: Link) -> Port:
         """Put an open link's bytes on the line, and the line's on the link."""
+        kernel = self.host.kernel
+
+        def tell(text: str) -> None:
+            self.bus.tell(Report(kernel.now, None, ReportKind.WARNING, text))
+
+        tuning = Tuning(link, self.bus.rate.baud, Random(self.configuration.seed), tell)
 
         def hear(heard: Heard, _now: int) -> None:
-            link.send(heard.data)
+            link.send(tuning.pass_on(heard.data))
+
+        def deliver(data: bytes) -> None:
+            self.host.arrive(port.talk, tuning.pass_on(data))
 
         port = Port(self.bus.medium, hear, echo=self.configuration.echo)
-        link.open(partial(self.host.arrive, port.talk))
+        link.open(deliver)
         self.links.append(link)
         return port
 
@@ -126,20 +135,21 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
         lanes=configuration.lanes,
         seed=configuration.seed,
     )
-    state = None
-    if configuration.state is not None:
-        state = StateDirectory(configuration.state, configuration.name)
-        state.check()
-    for address in configuration.nodes:
-        node = kind.create(address, settings, rate, bus.tell)
-        if state is not None:
-            memory, remark = state.load(address, kind.name)
-            if remark is not None:
-                bus.tell(Report(kernel.now, address, ReportKind.WARNING, remark))
-            if memory is not None:
-                node.restore(memory)
-        bus.add(node)
     with ExitStack() as stack:
+        state = None
+        if configuration.state is not None:
+            state = StateDirectory(configuration.state, configuration.name)
+            state.claim()
+            stack.callback(state.release)
+        for address in configuration.nodes:
+            node = kind.create(address, settings, rate, bus.tell)
+            if state is not None:
+                memory, remark = state.load(address, kind.name)
+                if remark is not None:
+                    bus.tell(Report(kernel.now, address, ReportKind.WARNING, remark))
+                if memory is not None:
+                    node.restore(memory)
+            bus.add(node)
         host: Host
         if virtual:
             host = VirtualHost(kernel)

@@ -92,11 +92,12 @@ class ReportKind(Enum):
 class Report:
     """Something a node says out of band: never on the wire, never an exception.
 
-    ``line`` is the command line it is about, ``column`` the place in it (from 1; 0: the whole).
+    ``address`` is the node's, None when it is about the line itself. ``line`` is the command line
+    that it is about, ``column`` the place in it (from 1; 0: the whole).
     """
 
     when: Ns
-    address: int
+    address: int | None
     kind: ReportKind
     text: str
     line: str = ""
@@ -105,7 +106,8 @@ class Report:
     def __str__(self) -> str:
         where = f" in {self.line!r}" if self.line else ""
         place = f", column {self.column}" if self.column else ""
-        return f"node {self.address}: {self.kind.value}{where}{place}: {self.text}"
+        who = "line" if self.address is None else f"node {self.address}"
+        return f"{who}: {self.kind.value}{where}{place}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)

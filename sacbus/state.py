@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
+
+if sys.platform != "win32":
+    import fcntl
 
 from platformdirs import user_state_path
 
@@ -37,6 +41,7 @@ class StateDirectory:
 
     def __init__(self, directory: Path, bus: str) -> None:
         self._place = directory / bus
+        self._lock: int | None = None
 
     def path(self, address: int) -> Path:
         """Where the memory of the node configured at ``address`` lies."""
@@ -69,6 +74,8 @@ class StateDirectory:
         """Write a memory; whatever happens, the file is either the old or the new one."""
         path = self.path(address)
         content = _encode(kind, memory)
+        if self._holds(path, content):
+            return
         fresh = path.with_name(f".{path.name}.{os.getpid()}.new")
         try:
             self._place.mkdir(parents=True, exist_ok=True)
@@ -81,8 +88,38 @@ class StateDirectory:
             fresh.unlink(missing_ok=True)
             raise self._unusable("write", path, fault) from fault
 
-    def check(self) -> None:
-        """Make sure now that memory can be saved later; StateError otherwise."""
+    def _holds(self, path: Path, content: bytes) -> bool:
+        try:
+            return path.read_bytes() == content
+        except OSError:  # whatever is wrong there, writing will tell
+            return False
+
+    def claim(self) -> None:
+        """Take the bus's memory for this process, and make sure that it can be saved later.
+
+        StateError otherwise, also while another process has it: two would overwrite each other.
+        """
+        self._make()
+        if sys.platform == "win32":
+            return
+        # The directory itself is locked, so that nothing but memories ever lies in it.
+        lock = os.open(self._place, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as fault:
+            os.close(lock)
+            raise StateError(
+                f"the nodes' memory is in use by another sacbus, {self._place}, {_CURE}"
+            ) from fault
+        self._lock = lock
+
+    def release(self) -> None:
+        """Let others have it. Idempotent."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def _make(self) -> None:
         try:
             self._place.mkdir(parents=True, exist_ok=True)
         except OSError as fault:

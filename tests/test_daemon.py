@@ -406,3 +406,54 @@ def test_a_bus_that_is_closed_takes_nothing_in() -> None:
         return bus
 
     assert asyncio.run(scene()).host.kernel.next_at() is None
+
+
+def test_a_client_at_another_baud_rate_is_garbled_both_ways_and_told_once() -> None:
+    async def scene() -> tuple[bytes, bytes, list[str], float]:
+        async with open_bus() as bus:
+            link = MemoryLink(where="memory", baud=38_400)
+            bus.attach(link)
+            client = link.client(baud=9_600)
+            client.write(encode(10, 1, b"m400"))
+            client.write(encode(11, 1, b"m400"))
+            await asyncio.sleep(1)
+            wrong = client.read()
+            # Mother's traffic reaches the client too, at the wrong rate as anything else.
+            await bus.mother().send(12, "y")
+            heard = client.read()
+            client.baud = 38_400
+            client.write(encode(10, 1, b"m5"))
+            await asyncio.sleep(1)
+            assert client.read() == ACK_10
+            return (
+                wrong,
+                heard,
+                [str(one) for one in bus.bus.reports],
+                bus.snapshot(10).position_steps,
+            )
+
+    wrong, heard, reports, steps = virtually(scene())
+    assert ACK_10 not in wrong
+    assert heard[:7] != encode(12, 1, b"y")
+    assert len(heard) >= len(encode(12, 1, b"y"))
+    assert steps == 5
+    told = [one for one in reports if "baud" in one]
+    assert told == [
+        (
+            "line: warning: the program on memory has set 9600 baud, the line runs at 38400: "
+            "bytes arrive garbled"
+        )
+    ]
+
+
+def test_a_second_bus_does_not_get_the_memory_that_the_first_one_has(tmp_path: Path) -> None:
+    async def scene() -> None:
+        configuration = Configuration(state=tmp_path)
+        async with open_bus(configuration):
+            with pytest.raises(StateError, match="in use by another sacbus"):
+                async with open_bus(configuration):
+                    pass
+        async with open_bus(configuration):
+            pass  # given back
+
+    virtually(scene())

@@ -136,7 +136,7 @@ def test_whatever_the_file_holds_loading_says_so_and_goes_on(
 def test_a_directory_that_cannot_be_made_is_told_before_anything_runs(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(StateError) as told:
-        StateDirectory(tmp_path / "file" / "state", "bus").check()
+        StateDirectory(tmp_path / "file" / "state", "bus").claim()
     assert str(told.value) == (
         f"cannot create the state directory (Not a directory), {tmp_path}/file/state/bus, "
         "choose another directory with --state DIR, or --ephemeral to keep nothing"
@@ -148,7 +148,7 @@ def test_a_directory_that_cannot_be_written_is_told_before_anything_runs(tmp_pat
     place = tmp_path / "bus"
     place.mkdir(mode=0o500)
     with pytest.raises(StateError, match="cannot write the state directory"):
-        StateDirectory(tmp_path, "bus").check()
+        StateDirectory(tmp_path, "bus").claim()
 
 
 def test_a_file_that_cannot_be_read_is_told_and_left_alone(state: StateDirectory) -> None:

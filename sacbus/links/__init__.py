@@ -10,6 +10,7 @@ from .link import Link, LinkCounters
 from .memory import MemoryClient, MemoryLink
 from .presence import Presence
 from .pty import PtyLink
+from .tuning import Tuning
 
 __all__ = [
     "Line",
@@ -21,5 +22,6 @@ __all__ = [
     "PathTaken",
     "Presence",
     "PtyLink",
+    "Tuning",
     "open_line",
 ]

@@ -102,11 +102,11 @@ class Caller:
         self._receiver = PacketReceiver()
         self._waiting: deque[_Request] = deque()
         self._outstanding: _Request | None = None
-        #: When the outstanding request's answer is overdue, and when we shall next look. Looking is
-        #: appointed only when no look comes as early: nearly all answers come in time, and nearly
-        #: all requests do without an appointment of their own.
+        #: When the outstanding request's answer is overdue, and whether a look at it is appointed.
+        #: One at a time: nearly all answers come in time, and nearly all requests do without an
+        #: appointment of their own.
         self._due: Ns = 0
-        self._watch: Ns | None = None
+        self._watching = False
         #: True while the pause after a packet lasts, or a broadcast is on its way.
         self._pausing = False
         self._broadcasting: _Request | None = None
@@ -221,9 +221,9 @@ class Caller:
             answer = turnaround(len(request.body), nul_follows=True)
             answer += self._rate.span(ANSWER_BYTES)
             self._due = now + line_time + answer + self._slack
-            if self._watch is None or self._due < self._watch:
-                self._watch = self._due
-                clock.at(self._due, self._look, self._due)
+            if not self._watching:
+                self._watching = True
+                clock.at(self._due, self._look)
         self._send(request.data)
 
     def _answered(self, answer: Answer) -> None:
@@ -247,17 +247,16 @@ class Caller:
         else:
             request.done(self._failure(Refused, request))
 
-    def _look(self, when: Ns) -> None:
+    def _look(self) -> None:
         """See whether the answer that we wait for is overdue."""
-        if self._watch != when:
-            return
-        self._watch = None
+        self._watching = False
         request = self._outstanding
         if request is None:
             return
         if self._due > self._clock.now:
-            self._watch = self._due
-            self._clock.at(self._due, self._look, self._due)
+            # Another one than the look was for; it always is due later than that.
+            self._watching = True
+            self._clock.at(self._due, self._look)
         else:
             self._silent(request)
 

@@ -1,0 +1,48 @@
+"""A client at another baud rate than the line's: what becomes of the bytes between the two.
+
+Owns the one way in which a link touches bytes. A pty would pass on any byte at any setting; a wire
+does not, and a program that sets the wrong rate must find out here and not on the machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+
+from .link import Link
+
+__all__ = ["Tuning"]
+
+
+class Tuning:
+    """Between a link and a line of ``baud``: passes bytes on as they are, or spoilt.
+
+    At another rate every byte arrives as another value, drawn from ``noise``; ``tell`` is given a
+    sentence each time the client's rate turns out to be a new wrong one.
+    """
+
+    __slots__ = ("_baud", "_link", "_noise", "_tell", "_told", "spoilt")
+
+    def __init__(self, link: Link, baud: int, noise: Random, tell: Callable[[str], object]) -> None:
+        self._link = link
+        self._baud = baud
+        self._noise = noise
+        self._tell = tell
+        self._told: int | None = None
+        #: Bytes spoilt so far, in both directions.
+        self.spoilt = 0
+
+    def pass_on(self, data: bytes) -> bytes:
+        """What arrives of ``data`` at the other side, now."""
+        rate = self._link.client_baud()
+        if rate is None or rate == self._baud:
+            self._told = None
+            return data
+        if rate != self._told:
+            self._told = rate
+            self._tell(
+                f"the program on {self._link.where} has set {rate} baud, the line runs at "
+                f"{self._baud}: bytes arrive garbled"
+            )
+        self.spoilt += len(data)
+        return bytes(byte ^ self._noise.randrange(1, 256) for byte in data)
