@@ -173,6 +173,7 @@ def test_an_error_comes_out_and_leaves_the_clock_at_its_event_and_the_rest_due()
     assert (ran, kernel.now, kernel.ran) == ([20], 50, 2)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.integers(0, 40), st.booleans())), st.lists(st.integers(0, 50)))
 def test_whatever_is_scheduled_runs_by_time_and_then_by_order(
     events: list[tuple[int, bool]], stops: list[int]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from random import Random
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -77,6 +78,7 @@ def test_every_byte_that_was_touched_is_another_and_no_other_is(
     assert differing(DATA, arrived) == touched(hits, len(DATA))
 
 
+@pytest.mark.slow
 @given(HITS, st.lists(st.integers(0, len(DATA))), st.integers(0, 2**32))
 def test_everybody_hears_the_same_however_often_and_in_whatever_pieces(
     hits: list[tuple[Ns, Ns]], stops: list[int], seed: int

@@ -508,6 +508,14 @@ def test_continuous_motion_goes_before_what_runs_and_what_is_pending() -> None:
     assert settled(bench) == there + 50
 
 
+def test_continuous_motion_does_not_wait_for_one_that_is_held() -> None:
+    bench = Bench()
+    bench.hears("m5v10s", at=AT)
+    bench.hears("mv10", at=SECOND)
+    assert bench.position(SECOND + LOAD_ACC) == 1
+    assert bench.snapshot(2 * SECOND).rpm == 10
+
+
 def test_a_new_velocity_retargets_continuous_motion_with_the_sessions_acceleration() -> None:
     bench, twin = Bench(), Bench()
     for each in (bench, twin):
@@ -573,6 +581,7 @@ def test_a_velocity_that_the_gap_has_lost_does_not_come_back_with_a_new_one() ->
 # ---- GAP ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_manuals_200_0_0_turns_to_0_200_0_while_it_repeats() -> None:
     bench = Bench()
     for number in range(3):
@@ -586,6 +595,7 @@ def test_the_manuals_200_0_0_turns_to_0_200_0_while_it_repeats() -> None:
     assert set(apart[seamless:]) == {FAST}
 
 
+@pytest.mark.slow
 def test_a_chain_that_ends_without_deceleration_goes_on_at_its_speed() -> None:
     bench = Bench()
     bench.hears("m500v100a1d999", at=AT)
@@ -654,6 +664,37 @@ def test_a_stop_leaves_nothing_to_go_on_with() -> None:
     times = pulse_times(bench, 3 * SECOND + MS, 4 * SECOND)
     assert times[0] == 3 * SECOND + MS + LOAD_ACC
     assert times[1] - times[0] == STEP
+
+
+@pytest.mark.parametrize("stop", ["S", "s"])
+def test_a_stop_within_the_gap_takes_the_velocity_that_was_left(stop: str) -> None:
+    bench = Bench()
+    bench.hears("m10v100a999d999", at=AT)
+    end = AT + LOAD_ACC + 10 * FAST
+    command(bench, stop, end + MS)
+    command(bench, "m200v100a1d1", end + MS)
+    times = pulse_times(bench, end + MS, end + SECOND)
+    assert times[1] - times[0] == STEP
+
+
+def test_a_stop_with_grace_that_has_no_ramp_leaves_nothing_either() -> None:
+    bench = Bench()
+    bench.hears("d999", at=AT)
+    bench.hears("mv100", at=SECOND)
+    bench.hears("s", at=5 * SECOND)
+    # It is over within a period; the next one comes right after that, and would pass the test.
+    end = end_of_motion(bench)
+    command(bench, "m200v100a1d1", end + MS)
+    times = pulse_times(bench, end + MS, end + SECOND)
+    assert times[0] == end + MS + LOAD_ACC
+    assert times[1] - times[0] == STEP
+
+
+def end_of_motion(bench: Bench) -> Ns:
+    """When the command that runs will be over."""
+    end = bench.node._engine.end
+    assert end is not None
+    return end
 
 
 @pytest.mark.parametrize(("cycle_us", "gap"), [(16, 0), (20, 0), (15, LOAD), (10, LOAD)])

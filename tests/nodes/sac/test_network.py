@@ -228,6 +228,21 @@ def test_after_a_broadcast_it_is_deaf_from_the_end_of_the_nul_on(size: int, us: 
     assert after(packet(body(size), GENERAL_CALL), us * US - 1)[0].answers == []
 
 
+@pytest.mark.parametrize(("to", "us", "before"), [(NODE, 310, 1), (GENERAL_CALL, 370, 0)])
+def test_a_nul_that_comes_by_itself_puts_the_deaf_time_off_too(
+    to: int, us: int, before: int
+) -> None:
+    for pause, heard in ((us * US, 1), (us * US - 1, 0)):
+        bench = Bench(lanes=2)
+        data = packet("v1234", to)
+        sent = bench.sends(data[:-1], at=START)
+        nul = bench.sends(b"\x00", at=sent.end + 100 * US)
+        handled = nul.end + (385 * US + bench.span(4) if before else 0)
+        bench.sends(packet("v1"), at=handled + pause)
+        bench.run()
+        assert bench.answers == [ACKED] * (before + heard)
+
+
 def test_the_ack_of_a_soft_op_is_never_heard_but_its_deaf_time_is_felt() -> None:
     soft_op = packet(bytes((DC1,)), GENERAL_CALL, 10)
     assert after(soft_op, 370 * US)[0].answers == [ACKED]

@@ -204,6 +204,7 @@ PIECES = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(SETTINGS, PIECES)
 @example(SacSettings(), [(0, packet("m5v10"), 0, b""), (-2 * MS, packet("S"), 0, b"")])

@@ -97,6 +97,7 @@ def test_a_device_that_hears_at_the_cuts_acts_nowhere_else(before: bytes, data: 
             assert index + 1 in cuts
 
 
+@pytest.mark.slow
 @given(bursts, st.sampled_from((NODE, 10, 5)))
 def test_a_receiver_that_is_not_addressed_is_idle_and_stays_so(data: bytes, address: int) -> None:
     addressed = SAC_PROTOCOL.addressed(data)
