@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from sacbus.language import (
     Acceleration,
@@ -108,7 +109,7 @@ def plan_sequence(
     return planned
 
 
-def as_json(planned: Sequence[Planned]) -> dict[str, object]:
+def as_json(planned: Sequence[Planned]) -> dict[str, Any]:  # Any: it is JSON
     """The plan as the command line's JSON; times in µs (multiples of 0.5), null when endless."""
     last = planned[-1]
     duration = last.profile.duration

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sacbus.language import Motion
 from sacbus.motion import Drive, Profile, plan
+from tests.motion.strategies import motions
 
 FACTORY = Drive()
 
@@ -182,3 +187,30 @@ def test_no_steps_are_no_motion() -> None:
     profile = plan(command(0, 100), FACTORY)
     assert (profile.pulses, profile.duration) == (0, 0)
     assert profile.pulse_times(0, 1000).size == 0
+
+
+@given(
+    first=motions(),
+    steps=st.integers(1, 3_000),
+    extra=st.integers(0, 255),
+    start=st.integers(0, 99),
+)
+def test_what_a_drive_remembers_of_ramps_changes_no_plan(
+    first: Motion, steps: int, extra: int, start: int
+) -> None:
+    drive = Drive(ustep=2)
+    plan(first, drive, start)
+    second = replace(first, steps=steps, extra_pulses=extra)
+    known, fresh = plan(second, drive, start), plan(second, Drive(ustep=2), start)
+    assert (known.shares, known.duration, known.kept_rpm) == (
+        fresh.shares,
+        fresh.duration,
+        fresh.kept_rpm,
+    )
+
+
+def test_a_drive_does_not_remember_without_bound() -> None:
+    drive = Drive()
+    for steps in range(5_000):
+        plan(command(400, 100 + steps), drive)
+    assert 0 < len(drive.whole_ramps) <= 4_096
