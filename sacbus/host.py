@@ -16,7 +16,8 @@ from __future__ import annotations
 import asyncio
 import selectors
 from collections.abc import Callable, Coroutine
-from typing import Any, Final, TypeVar
+from concurrent.futures import Executor
+from typing import Any, Final, TypeVar, TypeVarTuple
 from typing import Protocol as Contract
 
 from sacbus.kernel import MS, SECOND, Kernel, Ns
@@ -24,6 +25,7 @@ from sacbus.kernel import MS, SECOND, Kernel, Ns
 __all__ = ["Host", "RealHost", "Standstill", "VirtualHost", "VirtualLoop", "run_virtual"]
 
 _T = TypeVar("_T")
+_Ts = TypeVarTuple("_Ts")
 
 #: Without pace, bus time runs ahead until the line has been quiet for this long: longer than any
 #: turnaround (0.92 ms) and link latency (1 ms), so that no answer waits for the clock.
@@ -138,6 +140,8 @@ class _VirtualSelector(selectors.DefaultSelector):
     """Instead of waiting, moves the kernel. Descriptors are looked at, never waited for."""
 
     kernel: Kernel
+    #: True once the loop has been asked to run something in a thread, which may take its time.
+    threads = False
 
     def select(self, timeout: float | None = None) -> list[Any]:
         ready = super().select(0)
@@ -152,8 +156,8 @@ class _VirtualSelector(selectors.DefaultSelector):
                 kernel.run_until(limit)
                 return []
         elif when is None:
-            # Only asyncio's own wake-up pipe is registered: no thread or descriptor can help.
-            if len(self.get_map()) <= 1:
+            # Only asyncio's own wake-up pipe is registered: no descriptor can help, nor a thread.
+            if len(self.get_map()) <= 1 and not self.threads:
                 raise Standstill(
                     "virtual time stands still: coroutines wait for something that no event on the "
                     "bus, no timer and no descriptor will ever bring"
@@ -170,12 +174,20 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         selector = _VirtualSelector()
         selector.kernel = kernel
         self.kernel = kernel
+        self._virtual_selector = selector
         super().__init__(selector)
         self._clock_resolution = 1 / SECOND
 
     def time(self) -> float:
         """Bus time in seconds."""
         return self.kernel.now / SECOND
+
+    def run_in_executor(
+        self, executor: Executor | None, func: Callable[[*_Ts], _T], *args: *_Ts
+    ) -> asyncio.Future[_T]:
+        """As asyncio's. Bus time stands still while nothing else is due and a thread works."""
+        self._virtual_selector.threads = True
+        return super().run_in_executor(executor, func, *args)
 
 
 class VirtualHost:

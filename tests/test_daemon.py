@@ -74,7 +74,7 @@ def test_the_same_configuration_gives_the_same_bytes_at_the_same_times() -> None
             async with open_bus(Configuration(nodes=(10, 11), seed=seed)) as bus:
                 bus.bus.medium.watchers.append(
                     lambda one: found.append(
-                        (one.start, one.data, one.arrived(0, len(one.data), Random(0)))
+                        (one.start, one.data, one.arrived(0, len(one.data), seed))
                     )
                 )
                 link = MemoryLink()

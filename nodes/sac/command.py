@@ -69,8 +69,9 @@ class CommandProcessor:
         "_drive",
         "_engine",
         "_free",
-        "_gap",
         "_held",
+        "_held_at",
+        "_held_loaded",
         "_kept_rpm",
         "_last_acc",
         "_last_end",
@@ -108,11 +109,13 @@ class CommandProcessor:
         self._pending: deque[int] = deque()
         self._current: Motion | None = None
         self._held: Motion | None = None
+        #: Where in the queue the held command stands (None: nowhere), and when it was loaded.
+        self._held_at: int | None = None
+        self._held_loaded: Ns = 0
         #: Continuous motion that begins as soon as what it cuts has ended.
         self._preempting: Motion | None = None
         #: When the node is free to load: now, or when its DC2 is out.
         self._free: Ns = 0
-        self._gap = True
         self._kept_rpm: Rpm = 0
         self._last_end: Ns = 0
         self._last_period = 0
@@ -203,7 +206,11 @@ class CommandProcessor:
 
     def _preempt(self, motion: Motion, now: Ns) -> None:
         """Continuous motion goes before what is pending; what runs is cut, its velocity kept."""
-        self._held = None
+        if self._held is not None:
+            # It goes back to the head of what is pending, to be held again.
+            self._held = None
+            if self._held_at is not None:
+                self._pending.appendleft(self._held_at)
         self._preempting = motion
         self._cut(now)
         self._load_next(now)
@@ -213,38 +220,38 @@ class CommandProcessor:
         if self._current is not None or self._held is not None:
             return
         motion = self._preempting
+        position = None
         if motion is not None:
             self._preempting = None
         elif self._pending:
-            motion = self._queue[self._pending.popleft()]
-        if motion is not None:
-            self._begin(motion, now)
-
-    def _begin(self, motion: Motion, now: Ns) -> None:
-        """Load a command; it starts unless it is held at sync."""
-        if motion.sync:
-            self._held = motion
-        else:
-            self._launch(motion, now)
-
-    def _launch(self, motion: Motion, now: Ns) -> None:
-        """Plan a loaded command and start it, after its start wait.
-
-        Seamless when it was there at the last one's end and is loaded within one more period: then
-        loading adds no time. Otherwise the first pulse comes a load time later, at slow again.
-        """
+            position = self._pending.popleft()
+            motion = self._queue[position]
+        if motion is None:
+            return
         acc = (motion.acc100, motion.dec100, motion.linear)
         load = load_ticks(acc != self._last_acc) * TICK
         self._last_acc = acc
-        ready = max(now, self._free) + load + motion.wait_us * 1_000
+        loaded = max(now, self._free) + load
+        if motion.sync:
+            self._held = motion
+            self._held_at = position
+            self._held_loaded = loaded
+        else:
+            self._launch(motion, loaded, was_waiting=now <= self._last_end)
+
+    def _launch(self, motion: Motion, ready: Ns, *, was_waiting: bool) -> None:
+        """Plan a command that may start at ``ready``, and start it after its start wait.
+
+        Seamless when it may start within one more period of the last one's end: then it keeps the
+        velocity, and if it was waiting at that end, loading adds no time. Else it starts at slow.
+        """
+        start = ready + motion.wait_us * 1_000
         kept = self._kept_rpm
-        start = ready
-        if kept and self._gap:
-            late = (ready - self._last_end) // TICK
-            if gap_passes(late, self._last_period):
-                start = ready if now > self._last_end or motion.wait_us else self._last_end
-            else:
+        if kept:
+            if not gap_passes((start - self._last_end) // TICK, self._last_period):
                 kept = 0
+            elif was_waiting and not motion.wait_us:
+                start = self._last_end
         profile = plan(motion, self._drive, kept)
         self._current = motion
         self._engine.start(profile, start)
@@ -334,7 +341,8 @@ class CommandProcessor:
         held = self._held
         if held is not None:
             self._held = None
-            self._launch(held, now)
+            # It was loaded while it was held: nodes that one broadcast releases start together.
+            self._launch(held, max(now, self._held_loaded), was_waiting=False)
 
     def _retarget(self, now: Ns) -> None:
         """A new session velocity re-targets continuous motion, with the session's acceleration."""

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from random import Random
 from typing import Protocol as Contract
 
 from sacbus.bus.transmission import Transmission
@@ -93,7 +92,8 @@ class Medium:
         self.rate = rate
         self._router = router
         self._lanes = [_Lane() for _ in range(lanes)]
-        self._noise = Random(seed)
+        self._seed = seed
+        self._sent = 0
         #: Called with each transmission when it is over; for traces and live displays.
         self.watchers: list[Callable[[Transmission], None]] = []
 
@@ -140,7 +140,8 @@ class Medium:
         span = self.rate.span(size)
         cuts = self._router.cuts(data) if lane == 0 else ()
         end = now + span
-        sent = Transmission(sender, lane, now, data, self.rate, end, cuts)
+        self._sent += 1
+        sent = Transmission(self._sent, sender, lane, now, data, self.rate, end, cuts)
         counters = place.counters
         counters.transmissions += 1
         counters.bytes += size
@@ -205,11 +206,11 @@ class Medium:
             self.kernel.at(sent.end, self._arrive, sent)
 
     def _spoilt(self, sent: Transmission, first: int, last: int) -> bytes:
-        return sent.arrived(first, last, self._noise)
+        return sent.arrived(first, last, self._seed)
 
     def _rest_matters(self, place: _Lane, sent: Transmission, upto: int) -> bool:
         """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""
-        if self.watchers or self._router.concerns(sent.data[upto:]):
+        if self.watchers or sent.collided or self._router.concerns(sent.data[upto:]):
             return True
         sender = sent.sender
         return any([owner is not sender for owner, _ in place.listeners])  # noqa: C419 (quicker)

@@ -6,7 +6,7 @@ Owns the bytes on the wire and which of them were hit when transmissions overlap
 from __future__ import annotations
 
 from collections.abc import Sequence
-from random import Random
+from zlib import crc32
 
 from sacbus.kernel import LineRate, Ns
 
@@ -16,10 +16,10 @@ __all__ = ["Transmission"]
 class Transmission:
     """Bytes sent in one go, without a pause, from ``start`` to ``end`` (ns) by ``sender``.
 
-    ``data`` is what the sender sent. What arrives is :meth:`arrived`; the two differ where another
-    transmission overlapped (``hits``: from-to pairs in ns). ``cuts`` are the offsets at which nodes
-    hear it, ``step`` how many of them have passed, ``to_nodes`` and ``to_listeners`` how many bytes
-    each have heard.
+    ``number`` is unique on its medium. ``data`` is what the sender sent. What arrives is
+    :meth:`arrived`; the two differ where another transmission overlapped (``hits``: from-to pairs
+    in ns). ``cuts`` are the offsets at which nodes hear it, ``step`` how many of them have passed,
+    ``to_nodes`` and ``to_listeners`` how many bytes each have heard.
     """
 
     __slots__ = (
@@ -30,6 +30,7 @@ class Transmission:
         "end",
         "hits",
         "lane",
+        "number",
         "rate",
         "sender",
         "start",
@@ -40,6 +41,7 @@ class Transmission:
 
     def __init__(
         self,
+        number: int,
         sender: object,
         lane: int,
         start: Ns,
@@ -48,6 +50,7 @@ class Transmission:
         end: Ns,
         cuts: Sequence[int],
     ) -> None:
+        self.number = number
         self.sender = sender
         self.lane = lane
         self.start = start
@@ -76,12 +79,13 @@ class Transmission:
         self.hits.append((begin, end))
         return False
 
-    def arrived(self, first: int, last: int, noise: Random) -> bytes:
+    def arrived(self, first: int, last: int, seed: int) -> bytes:
         """What arrived of bytes ``first`` to ``last`` (exclusive), all of which have ended by now.
 
-        A byte that any part of another transmission overlapped comes out as another value, drawn
-        once from ``noise``: everyone hears the same. Drivers that fight give no defined level, so
-        no rule of combination would be truer than chance.
+        A byte that any part of another transmission overlapped comes out as another value: drivers
+        that fight give no defined level, so no rule of combination would be truer than chance. The
+        chance hangs on ``seed``, the transmission and the byte alone, so that everyone hears the
+        same, whoever listens.
         """
         if self.hits is None:
             return self.data[first:last]
@@ -89,7 +93,7 @@ class Transmission:
             self._wire = bytearray(self.data)
         if last > self._settled:
             for index in sorted(self._struck(self.hits, self._settled, last)):
-                self._wire[index] ^= noise.randrange(1, 256)
+                self._wire[index] ^= crc32(b"%d %d %d" % (seed, self.number, index)) % 255 + 1
             self._settled = last
         return bytes(self._wire[first:last])
 

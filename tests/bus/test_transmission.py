@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from random import Random
 
 import pytest
 from hypothesis import given
@@ -18,7 +17,7 @@ DATA = bytes(range(0x40, 0x60))
 
 
 def transmission(data: bytes = DATA) -> Transmission:
-    return Transmission(None, 0, START, data, RATE, START + RATE.span(len(data)), ())
+    return Transmission(1, None, 0, START, data, RATE, START + RATE.span(len(data)), ())
 
 
 def differing(sent: bytes, arrived: bytes) -> list[int]:
@@ -56,8 +55,8 @@ HITS = st.lists(
 def test_what_nobody_touched_arrives_as_it_was_sent() -> None:
     sent = transmission()
     assert not sent.collided
-    assert sent.arrived(0, len(DATA), Random(0)) == DATA
-    assert sent.arrived(3, 5, Random(0)) == DATA[3:5]
+    assert sent.arrived(0, len(DATA), 0) == DATA
+    assert sent.arrived(3, 5, 0) == DATA[3:5]
 
 
 def test_only_the_first_hit_is_news() -> None:
@@ -74,7 +73,7 @@ def test_every_byte_that_was_touched_is_another_and_no_other_is(
     sent = transmission()
     for begin, end in hits:
         sent.hit(begin, end)
-    arrived = sent.arrived(0, len(DATA), Random(seed))
+    arrived = sent.arrived(0, len(DATA), seed)
     assert differing(DATA, arrived) == touched(hits, len(DATA))
 
 
@@ -87,28 +86,33 @@ def test_everybody_hears_the_same_however_often_and_in_whatever_pieces(
     for begin, end in hits:
         whole.hit(begin, end)
         pieces.hit(begin, end)
-    noise = Random(seed)
-    expected = whole.arrived(0, len(DATA), Random(seed))
+    expected = whole.arrived(0, len(DATA), seed)
     bounds = [0, *sorted(stops), len(DATA)]
-    heard = [pieces.arrived(first, last, noise) for first, last in pairwise(bounds)]
+    heard = [pieces.arrived(first, last, seed) for first, last in pairwise(bounds)]
     assert b"".join(heard) == expected
-    assert pieces.arrived(0, len(DATA), noise) == expected
+    assert pieces.arrived(0, len(DATA), seed) == expected
 
 
 def test_what_had_arrived_before_the_overlap_had_arrived() -> None:
     sent = transmission()
-    noise = Random(1)
-    first = sent.arrived(0, 4, noise)
+    first = sent.arrived(0, 4, 1)
     sent.hit(START + RATE.span(4), START + RATE.span(6))
     assert first == DATA[:4]
-    assert differing(DATA, sent.arrived(0, len(DATA), noise)) == [4, 5]
+    assert differing(DATA, sent.arrived(0, len(DATA), 1)) == [4, 5]
 
 
 def test_a_touched_byte_may_become_any_other_value() -> None:
-    noise = Random(2)
     values = set()
-    for _ in range(5_000):
+    for seed in range(5_000):
         sent = transmission(b"\x02")
         sent.hit(START, START + 1)
-        values |= set(sent.arrived(0, 1, noise))
+        values |= set(sent.arrived(0, 1, seed))
     assert values == set(range(256)) - {2}
+
+
+def test_two_transmissions_that_collide_are_not_spoilt_alike() -> None:
+    first = transmission()
+    second = Transmission(2, None, 0, START, DATA, RATE, START + RATE.span(len(DATA)), ())
+    for one in (first, second):
+        one.hit(START, START + RATE.span(len(DATA)))
+    assert first.arrived(0, len(DATA), 0) != second.arrived(0, len(DATA), 0)
