@@ -517,11 +517,11 @@ def test_continuous_motion_does_not_wait_for_one_that_is_held_and_which_is_held_
     assert bench.position(SECOND + LOAD_ACC) == 1
     snapshot = bench.snapshot(2 * SECOND)
     assert (snapshot.rpm, snapshot.pending) == (10, ("m5vc30000a1d1",))
-    bench.hears("N", at=2 * SECOND)
-    there = settled(bench)
-    assert bench.snapshot(LONG).state == "SYNC"
+    bench.hears("N", at=3 * SECOND)
+    snapshot = bench.snapshot(LONG)
+    assert (snapshot.state, snapshot.pending) == ("SYNC", ())
     bench.hears("y", at=2 * LONG)
-    assert settled(bench) == there + 5
+    assert settled(bench) == snapshot.position_pulses + 5
 
 
 def test_a_new_velocity_retargets_continuous_motion_with_the_sessions_acceleration() -> None:
