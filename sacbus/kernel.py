@@ -103,7 +103,14 @@ class Kernel:
         return None
 
     def run_until(self, limit: Ns) -> int:
-        """Run every event due at or before ``limit``, then move the clock there.
+        """Run every event due at or before ``limit``, then move the clock there; how many ran."""
+        ran = self.run_due(limit)
+        if limit > self.now:
+            self.now = limit
+        return ran
+
+    def run_due(self, limit: Ns) -> int:
+        """Run every event due at or before ``limit``; the clock stays at the last one.
 
         Events may schedule others, which run too if they are due. Returns how many ran. An
         exception of a callback is a defect of ours: it leaves the clock at its event and comes out.
@@ -116,14 +123,11 @@ class Kernel:
                 callback = appointment[2]
                 if callback is None:
                     continue
-                appointment[2] = None
                 self.now = appointment[0]
                 ran += 1
                 callback(*appointment[3])
         finally:
             self.ran += ran
-        if limit > self.now:
-            self.now = limit
         return ran
 
     def run_next(self) -> bool:
