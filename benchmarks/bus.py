@@ -7,6 +7,8 @@ baseline is what the kernel must do at least: five bare heap events an exchange.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from itertools import count
 
@@ -36,12 +38,19 @@ class FullBus:
         for address in range(FIRST, FIRST + nodes):
             self.bus.add(KIND.create(address, SacSettings(), self.bus.rate, self.bus.tell))
         self.answers: Counter[int] = Counter()
-        port = Port(self.bus.medium, lambda heard, _now: self.caller.hear(heard.data), latency=0)
-        self.caller = Caller(self.kernel, port.talk)
         self.lines = count()
-        for line in (b"a%d" % acceleration, b"d%d" % acceleration):
-            self.caller.broadcast(line, lambda _outcome: None)
-        self.kernel.run()
+        with self.mother() as caller:
+            for line in (b"a%d" % acceleration, b"d%d" % acceleration):
+                caller.broadcast(line, lambda _outcome: None)
+            self.kernel.run()
+
+    @contextmanager
+    def mother(self) -> Iterator[Caller]:
+        """Mother, who listens only while she is needed."""
+        port = Port(self.bus.medium, lambda heard, _now: caller.hear(heard.data), latency=0)
+        caller = Caller(self.kernel, port.talk)
+        yield caller
+        port.close()
 
     def line(self, steps: int) -> bytes:
         """A line unlike those before: ``steps`` to twice as many steps at 250 to 399 RPM."""
@@ -75,7 +84,7 @@ class FullBus:
 
     def exchange(self, times: int, addresses: range, steps: int) -> None:
         """The same through mother, who builds, sends, times and counts."""
-        caller, answers = self.caller, self.answers
+        answers = self.answers
         left = times
 
         def done(outcome: object) -> None:
@@ -89,9 +98,10 @@ class FullBus:
         def ask() -> None:
             caller.call(addresses[left % len(addresses)], self.line(steps), done)
 
-        ask()
-        while left:
-            self.kernel.run_until(self.kernel.now + SECOND)
+        with self.mother() as caller:
+            ask()
+            self.kernel.run_until(self.kernel.now + times * SECOND)
+        assert not left, f"{left} requests are without an answer"
 
     def broadcast(self, times: int) -> None:
         """``times`` distinct broadcasts, which every node obeys."""
@@ -101,10 +111,11 @@ class FullBus:
             nonlocal left
             left -= 1
 
-        for _ in range(times):
-            self.caller.broadcast(b"v%d" % (100 + next(self.lines) % 100_000), done)
-        while left:
-            self.kernel.run_until(self.kernel.now + SECOND)
+        with self.mother() as caller:
+            for _ in range(times):
+                caller.broadcast(b"v%d" % (100 + next(self.lines) % 100_000), done)
+            self.kernel.run_until(self.kernel.now + times * SECOND)
+        assert not left, f"{left} broadcasts are not out"
 
 
 def figures(rounds: int) -> list[Figure]:
