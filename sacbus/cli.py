@@ -129,7 +129,7 @@ def _setting(
     "--pty",
     type=click.Path(path_type=Path),
     metavar="PATH",
-    help="Make PATH a stable symlink to the bus's pty.",
+    help="Make PATH a stable symlink to the bus's pty; without it, only the pty's own name.",
 )
 @click.option(
     "--baud",
@@ -153,7 +153,9 @@ def _setting(
     show_default=True,
     help="Bus seconds in a second.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="For what is left to chance.")
+@click.option(
+    "--seed", type=int, default=0, show_default=True, help="For what overlapping bytes turn into."
+)
 @click.option(
     "--echo", is_flag=True, help="Give a client its own bytes back, as 2-wire adapters do."
 )
@@ -329,7 +331,10 @@ def plan_command(
 
     lines: list[str] = []
     for command in commands:
-        lines += sys.stdin.read().split() if command == "-" else [command]
+        if command == "-":
+            lines += [line for line in sys.stdin.read().splitlines() if line.strip()]
+        else:
+            lines.append(command)
     drive = Drive(sprf=sprf, slow_rpm=slow, ustep=ustep)
     try:
         planned = planning.plan_sequence(lines, drive, start_rpm=start_rpm, gap=gap)
@@ -401,9 +406,6 @@ def run(arguments: list[str]) -> int:
     Any other exception comes out with its traceback: it is a defect of ours, and worth a report.
     When whoever read our output has left (head, less), click ends the process with status 1.
     """
-    from sacbus.mother import MotherError
-    from sacbus.node import KindError, SettingError
-
     verbose = bool({"-v", "--verbose"} & set(arguments))
     try:
         status = root.main(arguments, prog_name="sacbus", standalone_mode=False)
@@ -412,14 +414,24 @@ def run(arguments: list[str]) -> int:
     except (click.Abort, KeyboardInterrupt):
         click.echo("interrupted", err=True)
         return INTERRUPTED
-    except (MotherError, KindError, SettingError) as fault:
-        text = str(fault.args[0]) if isinstance(fault, KindError) else str(fault)
-        return _failed(text, 1, verbose)
     except OSError as fault:
         # Links and the state directory say it in full; the system only what and where.
         named = f", {fault.filename}" if fault.filename is not None else ""
         return _failed(f"{fault.strerror}{named}" if fault.strerror else str(fault), 1, verbose)
+    except Exception as fault:
+        if not _is_for_users(fault):
+            raise
+        return _failed(str(fault.args[0]) if fault.args else str(fault), 1, verbose)
     return status if isinstance(status, int) else 0
+
+
+def _is_for_users(fault: Exception) -> bool:
+    """Whether its text is a line that a user can act on."""
+    # Imported only now: a command that goes well does not wait for what it does not need.
+    from sacbus.mother import MotherError
+    from sacbus.node import KindError, SettingError
+
+    return isinstance(fault, MotherError | KindError | SettingError)
 
 
 def _usage(fault: click.ClickException) -> str:

@@ -10,6 +10,7 @@ import asyncio
 from collections.abc import AsyncIterator, Mapping
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from random import Random
 
@@ -18,7 +19,16 @@ from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
 from sacbus.kernel import Kernel, LineRate
 from sacbus.links import Link, PtyLink, Tuning
 from sacbus.mother import Mother
-from sacbus.node import Heard, NodeKind, Report, ReportKind, Snapshot, find_kind, settings_from
+from sacbus.node import (
+    Heard,
+    NodeKind,
+    Report,
+    ReportKind,
+    SettingError,
+    Snapshot,
+    find_kind,
+    settings_from,
+)
 from sacbus.state import StateDirectory, StateError
 
 __all__ = ["Configuration", "HostedBus", "open_bus"]
@@ -56,6 +66,8 @@ class HostedBus:
         self.bus = bus
         self.host = host
         self.links: list[Link] = []
+        self._ports: list[Port] = []
+        self._mothers: list[Mother] = []
         #: Nodes by the address they were configured with, which names their memory.
         self._configured = dict(zip(configuration.nodes, bus.nodes, strict=True))
 
@@ -85,9 +97,10 @@ class HostedBus:
         def deliver(data: bytes) -> None:
             self.host.arrive(port.talk, tuning.pass_on(data))
 
-        port = Port(self.bus.medium, hear, echo=self.configuration.echo)
         link.open(deliver)
         self.links.append(link)
+        port = Port(self.bus.medium, hear, echo=self.configuration.echo)
+        self._ports.append(port)
         return port
 
     def mother(self) -> Mother:
@@ -97,8 +110,26 @@ class HostedBus:
             mother.hear(heard.data)
 
         port = Port(self.bus.medium, hear, latency=0)
-        mother = Mother(self.host.kernel, port.talk, rate=self.bus.rate, arrive=self.host.arrive)
+        self._ports.append(port)
+        mother = Mother(
+            self.host.kernel,
+            port.talk,
+            rate=self.bus.rate,
+            unsent=lambda: port.unsent,
+            arrive=self.host.arrive,
+        )
+        self._mothers.append(mother)
         return mother
+
+    def close(self) -> None:
+        """Let everybody go: links are closed, and mothers are told that the line is gone."""
+        for link in self.links:
+            link.close()
+        for port in self._ports:
+            port.close()
+        for mother in self._mothers:
+            mother.lose("the bus is closed")
+        self.host.close()
 
     def save(self, state: StateDirectory) -> None:
         """Write every node's memory; StateError for the first that could not be written."""
@@ -121,6 +152,7 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
     LinkError, each a line that a user can act on, with nothing left open.
     """
     configuration = configuration or Configuration()
+    _check(configuration)
     kind = find_kind(configuration.kind)
     settings = settings_from(kind.settings, configuration.settings)
     loop = asyncio.get_running_loop()
@@ -161,14 +193,30 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
                 speed=configuration.speed,
                 line_free_at=None if configuration.pace else lambda: bus.medium.free_at(lane),
             )
-        stack.callback(host.close)
         hosted = HostedBus(configuration, kind, bus, host)
+        stack.callback(hosted.close)
         if configuration.pty:
             path = configuration.pty if isinstance(configuration.pty, Path) else None
-            link = PtyLink(path, baud=configuration.baud)
-            stack.callback(link.close)
-            hosted.attach(link)
+            hosted.attach(PtyLink(path, baud=configuration.baud))
         if state is not None:
-            # Last, so that a bus that never ran overwrites nobody's memory.
+            # Last, so that a bus that never ran overwrites nobody's memory; and at once, so that
+            # what is killed has left as much as what is ended.
+            hosted.save(state)
             stack.callback(hosted.save, state)
         yield hosted
+
+
+def _check(configuration: Configuration) -> None:
+    """Refuse what no SAC and no line can be, and two nodes that would share a memory."""
+    if not 0 < configuration.speed < inf:
+        raise SettingError(f"speed: expected a number above 0, got {configuration.speed}")
+    if not 300 <= configuration.baud <= 4_000_000:
+        raise SettingError(f"baud: expected 300 to 4000000, got {configuration.baud}")
+    if configuration.lanes not in (None, 1, 2):
+        raise SettingError(f"lanes: expected 1 or 2, got {configuration.lanes}")
+    nodes = configuration.nodes
+    for number, address in enumerate(nodes):
+        if not 4 <= address <= 255:
+            raise SettingError(f"nodes: expected addresses from 4 to 255, got {address!r}")
+        if address in nodes[:number]:
+            raise SettingError(f"nodes: expected every address once, got {address} twice")

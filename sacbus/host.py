@@ -51,7 +51,7 @@ class RealHost:
 
     ``speed`` scales: 10 lets ten bus seconds pass in one. ``line_free_at``, when given, says when
     the line was last, or will be, free: then bus time runs ahead of the clock while the line is in
-    use (``serve --no-pace``); motion keeps the clock's time.
+    use (``serve --no-pace``), and by as much motion is ahead too; otherwise it keeps the clock's.
     """
 
     def __init__(
@@ -73,6 +73,8 @@ class RealHost:
         self._timer: asyncio.TimerHandle | None = None
         self._timer_for: Ns | None = None
         self._closed = False
+        #: True while the kernel runs, or what arrived is taken in.
+        self._busy = False
         self._arm()
 
     def bus_now(self) -> Ns:
@@ -84,9 +86,11 @@ class RealHost:
         """Bring bus time up to date, call back, and see to what follows from it."""
         if self._closed:
             return
-        self.kernel.run_until(self.bus_now())
-        callback(*arguments)
-        self._go_on()
+        if self._busy:
+            # From within an event: bus time is up to date, and the event is finished first.
+            self.kernel.at(self.kernel.now, callback, *arguments)
+            return
+        self._bring_up_to_date(callback, *arguments)
 
     def close(self) -> None:
         """Stop; no event runs any more."""
@@ -97,13 +101,19 @@ class RealHost:
 
     def _due(self) -> None:
         self._timer = None
-        self.kernel.run_until(self.bus_now())
-        self._go_on()
+        self._bring_up_to_date(_nothing)
 
-    def _go_on(self) -> None:
-        if self._line_free_at is not None:
-            self._run_ahead(self._line_free_at)
-        self._arm()
+    def _bring_up_to_date(self, callback: Callable[..., object], *arguments: object) -> None:
+        """Run what is due, call back, run what follows; arm the timer whatever comes out of it."""
+        self._busy = True
+        try:
+            self.kernel.run_until(self.bus_now())
+            callback(*arguments)
+            if self._line_free_at is not None:
+                self._run_ahead(self._line_free_at)
+        finally:
+            self._busy = False
+            self._arm()
 
     def _run_ahead(self, line_free_at: Callable[[], Ns | None]) -> None:
         """Run the line's events without waiting, and move the anchor by what that gained."""
@@ -132,6 +142,10 @@ class RealHost:
 
 class Standstill(RuntimeError):
     """Virtual time cannot go on: coroutines wait, and nothing on the bus or the loop is due."""
+
+
+def _nothing() -> None:
+    """What an event of the clock's own takes in."""
 
 
 class _VirtualSelector(selectors.DefaultSelector):

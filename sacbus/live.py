@@ -82,7 +82,8 @@ class Screen:
 
     def _erase(self) -> str:
         # Up to the first drawn line, then clear to the end of the screen.
-        return f"\x1b[{len(self._drawn)}A\x1b[J" if self._drawn else ""
+        # From the line's start: the terminal may have echoed a key, as it does Ctrl-C.
+        return f"\r\x1b[{len(self._drawn)}A\x1b[J" if self._drawn else ""
 
 
 def _cells(snapshot: Snapshot) -> tuple[str, ...]:

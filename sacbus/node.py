@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
@@ -218,7 +218,10 @@ class NodeSettings:
     """Base of a kind's settings: a frozen dataclass, each field with ``help`` in its metadata.
 
     Whole numbers carry ``low`` and ``high`` there, words their ``choices``; flags need no more.
+    ``given`` names those that somebody asked for, as opposed to defaults: they win over memory.
     """
+
+    given: frozenset[str] = field(default=frozenset(), init=False, repr=False, compare=False)
 
 
 class NodeKind(Contract):
@@ -304,21 +307,28 @@ def setting_list(model: type[NodeSettings]) -> list[Setting]:
     """The settings of a kind in the order of their declaration."""
     return [
         Setting(one.name, one.default, _allowed(one.metadata, one.default), one.metadata["help"])
-        for one in dataclasses.fields(model)
+        for one in _fields(model)
     ]
 
 
 def settings_from(model: type[NodeSettings], given: Mapping[str, object]) -> NodeSettings:
     """Settings checked against their model; SettingError for the first that does not fit."""
-    fields = {field.name: field for field in dataclasses.fields(model)}
+    fields = {one.name: one for one in _fields(model)}
     for name, value in given.items():
-        field = fields.get(name)
-        if field is None:
+        known = fields.get(name)
+        if known is None:
             raise SettingError(f"setting {name!r}: expected one of {', '.join(fields)}")
-        if not _fits(field.metadata, field.default, value):
-            allowed = _allowed(field.metadata, field.default)
+        if not _fits(known.metadata, known.default, value):
+            allowed = _allowed(known.metadata, known.default)
             raise SettingError(f"setting {name!r}: expected {allowed}, got {value!r}")
-    return model(**given)
+    settings = model(**given)
+    object.__setattr__(settings, "given", frozenset(given))
+    return settings
+
+
+def _fields(model: type[NodeSettings]) -> list[dataclasses.Field[Any]]:
+    """The fields that are settings; ``Any``: of whatever type each is."""
+    return [one for one in dataclasses.fields(model) if one.name != "given"]
 
 
 def _fits(metadata: Mapping[str, Any], default: object, value: object) -> bool:

@@ -14,6 +14,7 @@ from sacbus.language import (
     Acceleration,
     Deceleration,
     Defaults,
+    Forward,
     Motion,
     Move,
     Remark,
@@ -100,6 +101,11 @@ def plan_sequence(
                 end = None if profile.duration is None else start + profile.duration
             case None:
                 raise PlanError(_refusal(line, number, parsed.remarks))
+            case Forward():
+                raise PlanError(
+                    f"{line!r} begins with an address, command {number}, leave that out: what a "
+                    "command does is the same on every node"
+                )
             case _:
                 raise PlanError(
                     f"{line!r} is no motion, command {number}, give M…, V, A or D commands"

@@ -14,13 +14,12 @@ import sys
 from collections.abc import Callable
 from typing import Final
 
-import click
-
 from sacbus import __version__
 from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.kernel import MS, SECOND
 from sacbus.live import Screen, table
 from sacbus.node import Report
+from sacbus.writer import Writer
 
 __all__ = ["serve"]
 
@@ -72,6 +71,7 @@ async def serve(configuration: Configuration, *, as_json: bool, show_table: bool
         output.refresh()
         status = ended.result()
     output.stopped()
+    output.close()
     return status
 
 
@@ -83,17 +83,16 @@ class _Lines:
     def __init__(self, bus: HostedBus, lost: Callable[[OSError], None]) -> None:
         """``lost`` is told once when nothing can be written any more."""
         self._bus = bus
-        self._lost: Callable[[OSError], None] | None = lost
+        self._writer = Writer(lost, self.missed)
+        self.say = self._writer.say
 
-    def say(self, text: str) -> None:
-        """Write some text at once. Reports come from within the kernel: nothing is raised here."""
-        if self._lost is None:
-            return
-        try:
-            click.echo(text, nl=False)
-        except OSError as fault:
-            lost, self._lost = self._lost, None
-            lost(fault)
+    def missed(self, count: int) -> str:
+        """What stands where ``count`` texts were not read in time."""
+        return f"… {count} lines were not read in time and are missing here\n"
+
+    def close(self) -> None:
+        """Nothing more comes."""
+        self._writer.close()
 
     def ready(self) -> None:
         configuration = self._bus.configuration
@@ -114,7 +113,11 @@ class _Lines:
         """Nothing to draw."""
 
     def stopped(self) -> None:
-        self.say("stopped; port closed\n")
+        counters = self._bus.bus.medium.counters()
+        self.say(
+            f"stopped; port closed; {counters.transmissions} transmissions, "
+            f"{counters.bytes} bytes, {counters.collided} collided\n"
+        )
 
 
 class _Json(_Lines):
@@ -156,8 +159,22 @@ class _Json(_Lines):
                 "bytes": counters.bytes,
                 "collided": counters.collided,
                 "reports": dict(self._bus.bus.report_counts),
+                "nodes": [
+                    {
+                        "node": one.address,
+                        "state": one.state,
+                        "position_steps": one.position_steps,
+                        "position_pulses": one.position_pulses,
+                        **one.counters,
+                    }
+                    for one in self._bus.snapshots()
+                ],
             }
         )
+
+    def missed(self, count: int) -> str:
+        """As its own event."""
+        return json.dumps({"event": "missed", "lines": count}) + "\n"
 
     def _write(self, what: dict[str, object]) -> None:
         self.say(json.dumps(what) + "\n")
@@ -182,7 +199,8 @@ class _Table(_Lines):
         if self._reports > REPORTS_A_REFRESH:
             self._unseen += 1
         else:
-            self.say(self._screen.above(_printable(str(report))))
+            text = _printable(f"{report.when / SECOND:.6f} {report}")
+            self.say(self._screen.above(text))
 
     def refresh(self) -> None:
         self._reports = 0

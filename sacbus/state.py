@@ -108,6 +108,8 @@ class StateDirectory:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as fault:
             os.close(lock)
+            if not isinstance(fault, BlockingIOError):
+                raise self._unusable("lock", self._place, fault) from fault
             raise StateError(
                 f"the nodes' memory is in use by another sacbus, {self._place}, {_CURE}"
             ) from fault

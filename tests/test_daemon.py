@@ -16,7 +16,8 @@ from sacbus import open_bus
 from sacbus.daemon import Configuration, HostedBus
 from sacbus.host import run_virtual
 from sacbus.kernel import MS, SECOND, Kernel
-from sacbus.links import MemoryLink, PathTaken
+from sacbus.links import MemoryLink, PathTaken, PtyLink
+from sacbus.mother import LineLost
 from sacbus.node import KindError, SettingError
 from sacbus.state import StateDirectory, StateError
 from sacbus.wire import encode
@@ -247,6 +248,7 @@ def test_a_bus_that_could_not_open_saves_nothing(tmp_path: Path) -> None:
 def test_a_memory_that_cannot_be_saved_is_told_and_the_others_are_saved(tmp_path: Path) -> None:
     async def scene() -> None:
         async with open_bus(Configuration(state=tmp_path)):
+            (tmp_path / "bus" / "10").unlink()
             (tmp_path / "bus" / "10").mkdir()
             (tmp_path / "bus" / "10" / "something").touch()
 
@@ -457,3 +459,83 @@ def test_a_second_bus_does_not_get_the_memory_that_the_first_one_has(tmp_path: P
             pass  # given back
 
     virtually(scene())
+
+
+def test_mother_hears_that_the_bus_is_closed_before_and_after() -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            mother = bus.mother()
+            waiting = asyncio.ensure_future(mother.send(99, "y"))
+            await asyncio.sleep(0.001)
+        for request in (waiting, mother.send(10, "y")):
+            with pytest.raises(LineLost, match="the bus is closed"):
+                async with asyncio.timeout(10):
+                    await request
+
+    asyncio.run(scene())
+    virtually(scene())
+
+
+def test_every_link_is_closed_with_its_bus(tmp_path: Path) -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            bus.attach(PtyLink(tmp_path / "mine"))
+            with pytest.raises(PathTaken):
+                bus.attach(PtyLink(tmp_path / "mine"))
+            assert len(bus.links) == 1
+
+    asyncio.run(scene())
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"nodes": (3,)}, "nodes: expected addresses from 4 to 255, got 3"),
+        ({"nodes": (10, 11, 10)}, "nodes: expected every address once, got 10 twice"),
+        ({"speed": float("nan")}, "speed: expected a number above 0"),
+        ({"speed": float("inf")}, "speed: expected a number above 0"),
+        ({"baud": 0}, "baud: expected 300 to 4000000, got 0"),
+        ({"lanes": 3}, "lanes: expected 1 or 2, got 3"),
+    ],
+)
+def test_what_no_bus_can_be_is_refused(wrong: dict[str, Any], message: str) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(**wrong)):
+            pass
+
+    with pytest.raises(SettingError, match=message):
+        virtually(scene())
+
+
+def test_a_setting_that_is_given_wins_over_memory_and_is_kept(tmp_path: Path) -> None:
+    async def steps(**settings: object) -> float:
+        async with open_bus(Configuration(state=tmp_path, settings=settings)) as bus:
+            await bus.mother().send(10, "m400p")
+            await asyncio.sleep(10)
+            return bus.snapshot(10).position_steps
+
+    assert virtually(steps()) == 400
+    assert virtually(steps(ustep=1)) == 200
+    assert virtually(steps()) == 200
+    assert virtually(steps(ustep=0)) == 400
+
+
+def test_a_client_may_write_from_within_what_it_hears() -> None:
+    async def scene() -> list[str]:
+        async with open_bus(Configuration(pace=False)) as bus:
+            link = MemoryLink()
+            bus.attach(link)
+            heard: list[str] = []
+
+            def hear(data: bytes) -> None:
+                heard.append(data.hex())
+                if len(heard) == 1:
+                    client.write(encode(11, 1, b"y"))
+
+            client = link.client(hear)
+            client.write(encode(10, 1, b"y"))
+            await until(lambda: len(heard) == 2)
+            return heard
+
+    assert asyncio.run(scene()) == ["02010a06", "02010b06"]

@@ -286,3 +286,23 @@ def test_a_virtual_run_is_the_same_every_time() -> None:
     first, heard = run()
     assert any(len(said.data) == 4 for said in heard)
     assert run()[0] == first
+
+
+def test_an_event_that_fails_does_not_stop_the_clock() -> None:
+    async def scene() -> list[Ns]:
+        kernel = Kernel()
+        loop = asyncio.get_running_loop()
+        failed: list[object] = []
+        loop.set_exception_handler(lambda _loop, context: failed.append(context["exception"]))
+        ran: list[Ns] = []
+        kernel.at(1 * MS, lambda: 1 // 0)
+        kernel.at(5 * MS, lambda: ran.append(kernel.now))
+        host = RealHost(kernel, loop)
+        async with asyncio.timeout(10):
+            while not ran:  # noqa: ASYNC110 (bus time in real time has no event to wait on)
+                await asyncio.sleep(0)
+        host.close()
+        assert [type(one) for one in failed] == [ZeroDivisionError]
+        return ran
+
+    assert asyncio.run(scene()) == [5 * MS]

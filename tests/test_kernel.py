@@ -195,3 +195,14 @@ def test_whatever_is_scheduled_runs_by_time_and_then_by_order(
 
 def test_units_are_nanoseconds() -> None:
     assert (US, MS, SECOND) == (10**3, 10**6, 10**9)
+
+
+def test_cancelled_appointments_do_not_pile_up() -> None:
+    kernel = Kernel()
+    kept = kernel.at(SECOND, lambda: None)
+    for number in range(10_000):
+        kernel.cancel(kernel.at(10 * SECOND + number, lambda: None))
+    assert len(kernel._heap) < 200
+    assert kernel.next_at() == SECOND
+    assert kernel.run() == 1
+    kernel.cancel(kept)

@@ -117,7 +117,7 @@ class Terminal:
         self.lines: list[str] = []
 
     def write(self, text: str) -> None:
-        for up, rest in re.findall(r"(?:\x1b\[(\d+)A\x1b\[J)?([^\x1b]*)", text):
+        for up, rest in re.findall(r"(?:\r\x1b\[(\d+)A\x1b\[J)?([^\x1b\r]*)", text):
             if up:
                 assert int(up) <= len(self.lines), "the cursor leaves the screen"
                 del self.lines[len(self.lines) - int(up) :]

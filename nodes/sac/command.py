@@ -9,7 +9,6 @@ Source: manual, "Command buffer", "Motion", "Continuous", "GAP", "sync"; spec, c
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, Protocol, assert_never
 
@@ -28,10 +27,10 @@ from sacbus.language import (
     Stop,
     Velocity,
 )
-from sacbus.motion import Drive, Rpm, gap_passes, load_ticks, plan
+from sacbus.motion import Drive, Profile, Rpm, gap_passes, load_ticks, plan
 from sacbus.node import ReportKind
 
-__all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand"]
+__all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand", "shortest"]
 
 #: Positions of the command queue (manual, "Throw-away").
 QUEUE_LENGTH: Final = 30
@@ -55,6 +54,14 @@ class SoftOps(Protocol):
 
     def __call__(self, *, start: bool, at: Ns) -> Ns:
         """Have it told at ``at`` or as soon after as may be; when that will be out."""
+        ...
+
+
+class TellOfCommand(Protocol):
+    """Takes what is worth a report."""
+
+    def __call__(self, kind: ReportKind, text: str, command: str | None = None, /) -> None:
+        """``command`` is what it is about; None: the line that has just come."""
         ...
 
 
@@ -94,7 +101,7 @@ class CommandProcessor:
         drive: Drive,
         engine: Engine,
         soft_ops: SoftOps | None,
-        tell: Callable[[ReportKind, str], None],
+        tell: TellOfCommand,
     ) -> None:
         self.session = session
         self._drive = drive
@@ -193,7 +200,7 @@ class CommandProcessor:
         if motion.steps is None:
             self._preempt(motion, now)
             return
-        if len(self._pending) == QUEUE_LENGTH:
+        if len(self._pending) >= QUEUE_LENGTH:
             self._tell(
                 ReportKind.OVERRUN,
                 f"31 commands pending: queue position {self._position} overwritten",
@@ -207,12 +214,15 @@ class CommandProcessor:
     def _preempt(self, motion: Motion, now: Ns) -> None:
         """Continuous motion goes before what is pending; what runs is cut, its velocity kept."""
         if self._held is not None:
-            # It goes back to the head of what is pending, to be held again.
-            self._held = None
-            if self._held_at is not None:
+            # It goes back to the head of what is pending, to be held again; if there is room.
+            held, self._held = self._held, None
+            if self._held_at is not None and self._queue[self._held_at] is held:
                 self._pending.appendleft(self._held_at)
+            else:
+                self._tell(ReportKind.OVERRUN, f"{shortest(held)} was held, and is overwritten")
         self._preempting = motion
-        self._cut(now)
+        if not self._stopping:  # what comes while the motor slows down waits for that
+            self._cut(now)
         self._load_next(now)
 
     def _load_next(self, now: Ns) -> None:
@@ -255,10 +265,13 @@ class CommandProcessor:
         profile = plan(motion, self._drive, kept)
         self._current = motion
         self._engine.start(profile, start)
-        for warning in profile.warnings:
-            self._tell(ReportKind.WARNING, str(warning))
+        self._warn(profile)
         if self._soft_ops is not None:
             self._untold = start
+
+    def _warn(self, profile: Profile) -> None:
+        for warning in profile.warnings:
+            self._tell(ReportKind.WARNING, str(warning), shortest(profile.motion))
 
     def _finish(self, end: Ns) -> None:
         """House-keeping in STOP: the present command ends at ``end``."""
@@ -346,30 +359,54 @@ class CommandProcessor:
 
     def _retarget(self, now: Ns) -> None:
         """A new session velocity re-targets continuous motion, with the session's acceleration."""
+        if self._preempting is not None:
+            # It waits for the present pulse to end, and begins with the new velocity then.
+            self._preempting = self._at_session_velocity(self._preempting)
+            return
         current = self._current
         profile = self._engine.profile
         if current is None or current.steps is not None or profile is None:
             return
         if profile.duration is not None:
             return  # it is coming to its end: S, s, N, n or another command was heard
-        session = self.session
-        target = replace(
-            current,
-            rpm=session.rpm,
-            cycle_us=session.cycle_us,
-            acc100=session.acc100,
-            linear=session.linear,
-        )
-        self._current = target
+        target = self._current = self._at_session_velocity(current)
         if now < self._engine.started:
             started = self._engine.started
             self._engine.discard()
             self._engine.start(plan(target, self._drive, profile.start_rpm), started)
         else:
             self._engine.change(lambda profile, at: profile.retarget(at, target), now)
+        if self._engine.profile is not None:
+            self._warn(self._engine.profile)
+
+    def _at_session_velocity(self, motion: Motion) -> Motion:
+        session = self.session
+        return replace(
+            motion,
+            rpm=session.rpm,
+            cycle_us=session.cycle_us,
+            acc100=session.acc100,
+            linear=session.linear,
+        )
 
     def _single_pulses(self, signs: str) -> None:
         if self._engine.profile is not None:
-            self._tell(ReportKind.IGNORED, "single pulses only while the motor stands")
+            self._tell(
+                ReportKind.IGNORED,
+                "single pulses only while no command runs, or waits for its start",
+            )
             return
         self._engine.step(signs.count("+") - signs.count("-"))
+
+
+def shortest(motion: Motion) -> str:
+    """A resolved command in the manual's shortest form, with all that shapes its profile."""
+    return Move(
+        steps=motion.steps,
+        opposite=not motion.cw,
+        cycle_us=motion.cycle_us,
+        acc100=motion.acc100,
+        dec100=motion.dec100,
+        linear=motion.linear or None,
+        pulses=motion.pulses or None,
+    ).text()

@@ -9,6 +9,7 @@ Source: manual, "Communications"; spec, "Two ports, two manners".
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 from nodes.sac.command import CommandProcessor
 from sacbus.kernel import Ns
@@ -17,6 +18,9 @@ from sacbus.node import ReportKind
 from sacbus.wire import GENERAL_CALL
 
 __all__ = ["MessageProcessor"]
+
+
+_SPACE: Final = 0x20
 
 
 class MessageProcessor:
@@ -51,6 +55,8 @@ class MessageProcessor:
         command = parsed.command
         if parsed.remarks:
             self._tell_remarks(parsed)
+        if b" " in body and body[0] != _SPACE:
+            self._tell_of_rest(body)
         if type(command) is Move:  # nearly all are, and this is much quicker than a match
             self._commands.execute(command, now)
             return
@@ -71,4 +77,16 @@ class MessageProcessor:
     def _tell_remarks(self, parsed: Parsed) -> None:
         kind = ReportKind.REFUSED if parsed.command is None else ReportKind.WARNING
         for remark in parsed.remarks:
-            self._tell(kind, remark.text, self.line, remark.column)
+            text = f"expected {remark.expected}, got {remark.got}: {remark.text}"
+            self._tell(kind, text, self.line, remark.column)
+
+    def _tell_of_rest(self, body: bytes) -> None:
+        """A space ends a command; who wrote more than padding behind it may not know that."""
+        command, _, rest = body.partition(b" ")
+        if rest.strip(b" ") and not command[:1].isdigit() and command[:1] not in b"/.":
+            self._tell(
+                ReportKind.IGNORED,
+                "a space ends a command: what follows it is ignored",
+                self.line,
+                len(command) + 1,
+            )

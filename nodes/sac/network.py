@@ -15,6 +15,7 @@ from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
 from sacbus.node import Heard, ReportKind
 from sacbus.wire import (
+    ACK,
     GENERAL_CALL,
     MAX_BODY,
     STX,
@@ -139,8 +140,8 @@ class NetworkPort:
         self._outbox.append((not_before, data))
         self._see_what_is_due()
         for _, waiting in self._outbox:
-            begins += self._rate.span(len(waiting))
-        return begins
+            begins += self._rate.span(len(waiting)) + ENABLE_LEAD
+        return begins - ENABLE_LEAD
 
     def _see_what_is_due(self) -> None:
         if self._answer is not None:
@@ -159,6 +160,10 @@ class NetworkPort:
             self._answer = None
             self._waits_for = None
             self.receiving = self._receiver.open
+            if data[-1] == ACK:
+                self.acks += 1
+            else:
+                self.naks += 1
         else:
             data = self._outbox.popleft()[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
@@ -195,16 +200,17 @@ class NetworkPort:
             replies += (_AFTER_NUL if run or self._robust else _AFTER_TRIGGER)[size]
         answered = self.ack and not general
         if answered:
-            if wrong:
-                self.naks += 1
-                self._answer = nak(packet.src, self.address)
-            else:
-                self.acks += 1
-                self._answer = ack(packet.src, self.address)
+            if self._answer is not None:
+                # Only at line rates that outrun the turnaround.
+                self._tell(ReportKind.LOST, "an answer that had not begun when the next was due")
+            self._answer = (nak if wrong else ack)(packet.src, self.address)
         self._answer_at = replies
         if self._turnaround and not self._robust and (answered if wrong else not run):
             self._waits_for = (limit, size)
         if wrong:
+            self._tell(
+                ReportKind.LOST, f"a packet from {packet.src} with a wrong CRC; it gets a NAK"
+            )
             return
         if not answered:
             # Nothing to answer, but what it is told to send on takes as long to come.

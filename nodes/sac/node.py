@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from nodes.sac.command import CommandProcessor
+from nodes.sac.command import CommandProcessor, shortest
 from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
 from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
-from sacbus.language import Motion, Move, Session
+from sacbus.language import Session
 from sacbus.node import Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
@@ -45,7 +45,7 @@ class SacNode:
             memory.drive(),
             self._engine,
             self._tell_ops if memory.soft_ops else None,
-            self._tell,
+            self._tell_of_command,
         )
         self._network = NetworkPort(
             memory.d_id, self._settings, self._rate, self._network_line, self._tell
@@ -97,8 +97,8 @@ class SacNode:
             position_steps=pulses / 2**self._memory.ustep,
             position_pulses=pulses,
             rpm=engine.rpm(now),
-            current="" if current is None else _short(current),
-            pending=tuple(map(_short, pending)),
+            current="" if current is None else shortest(current),
+            pending=tuple(map(shortest, pending)),
             counters={"packets": network.packets, "ack": network.acks, "nak": network.naks},
         )
 
@@ -109,7 +109,7 @@ class SacNode:
     def restore(self, memory: Mapping[str, object]) -> None:
         """Boot with a stored EEPROM; the stored d_id wins over the configured address."""
         configured = self._memory.d_id
-        restored, remarks = self._memory.restored(memory)
+        restored, remarks = self._memory.restored({**memory, **self._settings.asked_for()})
         for remark in remarks:
             self._tell(ReportKind.WARNING, remark)
         if restored.d_id != configured:
@@ -127,20 +127,11 @@ class SacNode:
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
     def _tell(self, kind: ReportKind, text: str) -> None:
-        self._tell_line(kind, text, self._messages.line, 0)
+        self._tell_line(kind, text, "", 0)
+
+    def _tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
+        """About a command that runs later than it came, or else about the line that has come."""
+        self._tell_line(kind, text, self._messages.line if command is None else command, 0)
 
     def _tell_line(self, kind: ReportKind, text: str, line: str, column: int) -> None:
         self._tell_bus(Report(self._now, self.address, kind, text, line, column))
-
-
-def _short(motion: Motion) -> str:
-    """A resolved command in the manual's shortest form, with all that shapes its profile."""
-    return Move(
-        steps=motion.steps,
-        opposite=not motion.cw,
-        cycle_us=motion.cycle_us,
-        acc100=motion.acc100,
-        dec100=motion.dec100,
-        linear=motion.linear or None,
-        pulses=motion.pulses or None,
-    ).text()

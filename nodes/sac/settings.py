@@ -1,17 +1,23 @@
 """What a configuration may say about a SAC.
 
-Owns the settings model: how its receiver and its times behave, and factory values of persistent
-parameters (an EEPROM that is already there wins over these).
+Owns the settings model: how its receiver and its times behave, and values of persistent parameters.
+Those that are given win over an EEPROM that is already there, as if they had been configured; only
+the address does not (``SacNode.restore``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Final
 
 from nodes.sac.memory import Memory
 from sacbus.node import NodeSettings
 
 __all__ = ["SacSettings"]
+
+#: Settings that are persistent parameters as well; those that have another name there.
+_PERSISTENT: Final = ("linear", "ustep", "slow", "sprf", "cycle", "soft_ops", "ack", "crc")
+_PARAMETER: Final = {"linear": "ramp"}
 
 
 @dataclass(frozen=True)
@@ -57,14 +63,15 @@ class SacSettings(NodeSettings):
 
     def factory_memory(self, address: int) -> Memory:
         """The EEPROM at the first boot of a node that is configured at ``address``."""
-        return Memory(
-            ramp=int(self.linear),
-            ustep=self.ustep,
-            slow=self.slow,
-            d_id=address,
-            sprf=self.sprf,
-            cycle=self.cycle,
-            soft_ops=int(self.soft_ops),
-            ack=int(self.ack),
-            crc=int(self.crc),
+        return replace(
+            Memory(d_id=address),
+            **{_PARAMETER.get(name, name): int(getattr(self, name)) for name in _PERSISTENT},
         )
+
+    def asked_for(self) -> dict[str, int]:
+        """The persistent parameters that somebody set, by their names in memory."""
+        return {
+            _PARAMETER.get(name, name): int(getattr(self, name))
+            for name in _PERSISTENT
+            if name in self.given
+        }

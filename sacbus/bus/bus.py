@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 from sacbus.bus.medium import Medium
-from sacbus.kernel import Kernel, LineRate, Ns
+from sacbus.kernel import Appointment, Kernel, LineRate, Ns
 from sacbus.node import Heard, Node, Protocol, Report
 
 __all__ = ["Bus"]
@@ -19,16 +19,21 @@ __all__ = ["Bus"]
 #: Reports kept for whoever asks later; older ones are only counted.
 REPORTS_KEPT: Final = 1_000
 
+#: Appointments of one node that may stand at a time; two are usual.
+STANDING: Final = 8
+
 
 class _Seat:
-    """A node's place on the bus and its next appointment with the kernel."""
+    """A node's place on the bus and its appointments with the kernel."""
 
-    __slots__ = ("due", "node", "order")
+    __slots__ = ("due", "node", "order", "standing")
 
     def __init__(self, node: Node, order: int) -> None:
         self.node = node
         self.order = order
+        #: The appointment that counts, and all that stand, by their times.
         self.due: Ns | None = None
+        self.standing: dict[Ns, Appointment] = {}
 
 
 class Bus:
@@ -125,11 +130,13 @@ class _Routes:
         seat = _Seat(node, len(self.seats))
         self.seats.append(seat)
         self._by_address.setdefault(node.address, []).append(seat)
+        self._see_if_open(seat)
         self._appoint(seat)
 
     def touch(self, node: Node) -> None:
         for seat in self.seats:
             if seat.node is node:
+                self._see_if_open(seat)
                 self._appoint(seat)
 
     def deliver(self, heard: Heard, sender: object, now: Ns) -> None:
@@ -149,10 +156,7 @@ class _Routes:
             if node is sender:
                 continue
             node.hear(heard, now)
-            if node.receiving:
-                self._open[seat] = None
-            elif self._open:
-                self._open.pop(seat, None)
+            self._see_if_open(seat)
             self._appoint(seat)
 
     def _several(self, addresses: Sequence[int], others: dict[_Seat, None]) -> list[_Seat]:
@@ -165,17 +169,26 @@ class _Routes:
     def _appoint(self, seat: _Seat) -> None:
         """Make the node's next appointment, unless one as early stands already.
 
-        A later one that stands is not cancelled: when it comes, :meth:`_wake` finds that it is not
-        the one that counts.
+        One that stands for later is kept: usually the node will want it again (the end of its
+        motion, after the answer that comes first). When it comes and does not count, nothing
+        happens; when too many stand, those that do not count are cancelled.
         """
         when = seat.node.wake_at()
-        if when is not None and (seat.due is None or when < seat.due):
-            if when < self._kernel.now:
-                when = self._kernel.now
-            seat.due = when
-            self._kernel.at(when, self._wake, seat, when)
+        if when is None or (seat.due is not None and when >= seat.due):
+            return
+        if when < self._kernel.now:
+            when = self._kernel.now
+        seat.due = when
+        standing = seat.standing
+        if when not in standing:
+            if len(standing) >= STANDING:
+                for appointment in standing.values():
+                    self._kernel.cancel(appointment)
+                standing.clear()
+            standing[when] = self._kernel.at(when, self._wake, seat, when)
 
     def _wake(self, seat: _Seat, when: Ns) -> None:
+        del seat.standing[when]
         if seat.due != when:
             return
         seat.due = None
@@ -183,8 +196,11 @@ class _Routes:
         data = node.wake(when)
         if data:
             self.transmit(node, data)
-        if node.receiving:
+        self._see_if_open(seat)
+        self._appoint(seat)
+
+    def _see_if_open(self, seat: _Seat) -> None:
+        if seat.node.receiving:
             self._open[seat] = None
         elif self._open:
             self._open.pop(seat, None)
-        self._appoint(seat)

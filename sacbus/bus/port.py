@@ -78,12 +78,6 @@ class Port:
         else:
             self._start()
 
-    def drop(self) -> int:
-        """Forget what has not been sent; how many bytes that was."""
-        dropped = len(self._buffer)
-        self._buffer.clear()
-        return dropped
-
     def close(self) -> None:
         """Leave the line. What is being sent is sent to its end; the rest is dropped."""
         self._buffer.clear()

@@ -31,8 +31,8 @@ from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
 
 __all__ = ["Acknowledged", "Caller", "Clock", "Sent"]
 
-#: How long an answer may be late beyond the line's own figures, on a line in this process: it
-#: covers a port that waits for the line (1 ms) and whatever else talks meanwhile.
+#: How long an answer may be late beyond the line's own figures, on a line in this process, once
+#: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
 
 #: Attempts for what may be repeated.
@@ -72,8 +72,10 @@ class _Request:
     body: bytes
     data: bytes
     done: Callable[[Acknowledged | Sent | MotherError], None]
-    accept_duplicates: bool
+    #: Whether it may run twice: the caller said so, or, as looked up at silence, the line may.
+    may_repeat: bool
     attempts: int = 0
+    refusals: int = 0
     sent_at: Ns = 0
     last: str = "none"
     withdrawn: bool = False
@@ -82,7 +84,8 @@ class _Request:
 class Caller:
     """Requests in order, one outstanding. ``send`` takes the bytes of a packet.
 
-    ``slack`` is how much later than the line's own figures an answer may come.
+    ``slack`` is how much later than the line's own figures an answer may come. ``unsent``, where it
+    can be known, tells how many bytes still wait for the line: while any do, no answer is late.
     """
 
     def __init__(
@@ -92,12 +95,14 @@ class Caller:
         *,
         rate: LineRate | None = None,
         slack: Ns = SLACK,
+        unsent: Callable[[], int] | None = None,
         tries: int = TRIES,
     ) -> None:
         self._clock = clock
         self._send = send
         self._rate = rate or LineRate()
         self._slack = slack
+        self._unsent = unsent
         self._tries = tries
         self._receiver = PacketReceiver()
         self._waiting: deque[_Request] = deque()
@@ -154,7 +159,7 @@ class Caller:
                 body,
                 encode(GENERAL_CALL, MOTHER, body),
                 done,
-                accept_duplicates=False,
+                may_repeat=False,
             )
         )
 
@@ -180,6 +185,11 @@ class Caller:
                 self.faults += 1
             elif type(event) is Packet and event.src != MOTHER:
                 self.overheard += 1
+
+    @property
+    def lost(self) -> LineLost | None:
+        """Why nothing can be sent any more; None while it can."""
+        return self._lost
 
     def lose(self, why: str) -> None:
         """The line is gone: everything that waits fails, and so does all that is asked later."""
@@ -218,9 +228,7 @@ class Caller:
             clock.at(now + line_time + MOTHER_GAP, self._broadcast_over)
         else:
             self._outstanding = request
-            answer = turnaround(len(request.body), nul_follows=True)
-            answer += self._rate.span(ANSWER_BYTES)
-            self._due = now + line_time + answer + self._slack
+            self._due = now + self._patience(request)
             if not self._watching:
                 self._watching = True
                 clock.at(self._due, self._look)
@@ -242,10 +250,11 @@ class Caller:
             return
         statistics.naks += 1
         request.last = "NAK"
+        request.refusals += 1
         if request.attempts < self._tries and not request.withdrawn:
             self._waiting.appendleft(request)
         else:
-            request.done(self._failure(Refused, request))
+            request.done(self._failure(request))
 
     def _look(self) -> None:
         """See whether the answer that we wait for is overdue."""
@@ -253,6 +262,8 @@ class Caller:
         request = self._outstanding
         if request is None:
             return
+        if self._due <= self._clock.now and self._unsent is not None and self._unsent():
+            self._due = self._clock.now + self._patience(request)
         if self._due > self._clock.now:
             # Another one than the look was for; it always is due later than that.
             self._watching = True
@@ -260,16 +271,20 @@ class Caller:
         else:
             self._silent(request)
 
+    def _patience(self, request: _Request) -> Ns:
+        """How long an answer may take, from the packet's first bit on."""
+        answer = turnaround(len(request.body), nul_follows=True) + self._rate.span(ANSWER_BYTES)
+        return self._rate.span(len(request.data)) + answer + self._slack
+
     def _silent(self, request: _Request) -> None:
         self._outstanding = None
         self.statistics[request.node].timeouts += 1
         request.last = "silence"
-        if not (request.accept_duplicates or repeatable(request.body)):
-            request.done(self._failure(UnknownOutcome, request))
-        elif request.attempts < self._tries and not request.withdrawn:
+        request.may_repeat = request.may_repeat or repeatable(request.body)
+        if request.may_repeat and request.attempts < self._tries and not request.withdrawn:
             self._waiting.appendleft(request)
         else:
-            request.done(self._failure(NoAnswer, request))
+            request.done(self._failure(request))
         self._next()
 
     def _pause(self) -> None:
@@ -288,8 +303,12 @@ class Caller:
             request.done(Sent())
         self._next()
 
-    def _failure(
-        self, kind: type[Refused | NoAnswer | UnknownOutcome], request: _Request
-    ) -> MotherError:
+    def _failure(self, request: _Request) -> MotherError:
+        """What is known in the end: NAK says that it was not executed, silence says nothing."""
+        kind: type[Refused | NoAnswer | UnknownOutcome] = UnknownOutcome
+        if request.refusals == request.attempts:
+            kind = Refused
+        elif request.may_repeat and not request.refusals:
+            kind = NoAnswer
         line = request.body.decode("latin-1").rstrip(" ")
         return kind(request.node, line, request.attempts, request.last)

@@ -45,11 +45,13 @@ class Refused(_Unanswered):
 class NoAnswer(_Unanswered, TimeoutError):
     """Silence, every time. What was asked may be asked again without harm."""
 
-    verdict = "nobody at that address, or its ACK is switched off"
+    verdict = "nobody at that address, its ACK is switched off, or the baud rate is another"
 
 
 class UnknownOutcome(_Unanswered, TimeoutError):
-    """Silence after a command that must not run twice: the node may have executed it, or not.
+    """Silence, and the node may have executed the command, or not.
+
+    So it is for a command that must not run twice, and for one that met silence as well as NAK.
 
     SAC has no sequence numbers, so a lost ACK cannot be told from a lost packet.
     """

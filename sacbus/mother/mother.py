@@ -58,6 +58,7 @@ class Mother:
         *,
         rate: LineRate | None = None,
         slack: Ns = SLACK,
+        unsent: Callable[[], int] | None = None,
         arrive: Callable[..., None] | None = None,
     ) -> None:
         """Have ``send`` put bytes on a line, with ``slack`` for answers beyond the line's figures.
@@ -65,7 +66,7 @@ class Mother:
         ``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a host's,
         when mother sits on a bus in this process.
         """
-        self._caller = Caller(clock, send, rate=rate, slack=slack)
+        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent)
         self._arrive = arrive or _call
 
     @classmethod
@@ -134,6 +135,9 @@ class Mother:
             else:
                 future.set_result(outcome)
 
+        if self._caller.lost is not None:
+            # Not through ``arrive``: a host that is closed takes nothing in any more.
+            raise self._caller.lost
         self._arrive(ask, done)
         try:
             return await future

@@ -51,5 +51,8 @@ def safe_body(body: bytes) -> bytes:
 def checked_address(node: int) -> int:
     """``node`` if a SAC can have it: 4 to 255 (0 is everybody, 1 mother, 2 and 3 STX and ETX)."""
     if not 4 <= node <= 255:
-        raise BadRequest(f"node {node}: expected an address from 4 to 255")
+        raise BadRequest(
+            f"node {node}: expected an address from 4 to 255"
+            + (", or a broadcast for all nodes" if node == 0 else "")
+        )
     return node

@@ -380,3 +380,15 @@ def test_counters_of_different_lanes_and_buses_are_their_own() -> None:
     assert other.bus.medium.counters() == before
     assert other.heard == []
     assert one.bus.medium.counters(1).bytes == 4
+
+
+def test_what_a_moving_node_hears_leaves_nothing_behind_in_the_kernel() -> None:
+    bench = Bench()
+    each = 30 * MS
+    bench.hears("m4000000000v1", at=each)
+    bench.kernel.run_until(2 * each)
+    standing = len(bench.kernel._heap)
+    for number in range(300):
+        bench.hears("m1v9" if number % 3 else "S", at=(number + 3) * each)
+    bench.kernel.run_until(400 * each)
+    assert len(bench.kernel._heap) <= standing + 80

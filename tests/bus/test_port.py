@@ -150,17 +150,6 @@ def test_on_two_lanes_nobody_hears_the_programs_bytes() -> None:
     assert speaker.data == other.data == ACK
 
 
-def test_what_is_dropped_is_counted_and_never_sent() -> None:
-    bench = Bench()
-    desk = Desk(bench)
-    desk.port.talk(b"\x02ABC")
-    desk.port.talk(b"DEF")
-    assert desk.port.drop() == 3
-    assert desk.port.unsent == 0
-    bench.run()
-    assert [sent.data for sent in desk.sent] == [b"\x02ABC"]
-
-
 def test_a_closed_port_finishes_what_it_sends_and_hears_no_more() -> None:
     bench = Bench()
     desk = Desk(bench)

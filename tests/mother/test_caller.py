@@ -8,10 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sacbus.kernel import MS
+from nodes.sac import KIND, SacSettings
+from sacbus.bus import Bus, Port
+from sacbus.kernel import MS, Kernel
 from sacbus.mother import (
     Acknowledged,
     BadRequest,
+    Caller,
     LineLost,
     NoAnswer,
     Refused,
@@ -255,13 +258,13 @@ def test_in_any_weather_each_call_ends_once_and_says_what_is_known(
             case Acknowledged(attempts=attempts):
                 assert 1 <= ran <= (attempts if accept else 1)
             case Refused():
-                # With duplicates accepted an earlier attempt may have run and its ACK been lost.
-                assert ran == 0 or accept
+                # NAK every time: it has not run, whatever was accepted.
+                assert ran == 0
             case NoAnswer():
                 assert accept
             case UnknownOutcome():
-                assert ran in (0, 1)
-                assert not accept
+                # With duplicates accepted: it met NAK as well as silence.
+                assert ran in (0, 1) or accept
             case _:
                 pytest.fail(f"{outcome!r}")
 
@@ -418,3 +421,34 @@ def test_statistics_count_each_node_apart() -> None:
         1,
     )
     assert list(ten.round_trips) == [TEN_BYTES + TURNAROUND + FOUR_BYTES]
+
+
+def test_nak_after_silence_is_no_refusal_for_the_first_packet_may_have_been_executed() -> None:
+    rig = Rig(10)
+    rig.expect([answer_lost, body_spoilt, body_spoilt])
+    outcome = rig.ask(10, b"m400", accept_duplicates=True)
+    assert isinstance(outcome, UnknownOutcome)
+    assert (outcome.attempts, outcome.last) == (3, "NAK")
+    assert rig.steps(10) == 400
+
+
+def test_silence_after_naks_is_not_an_absent_node() -> None:
+    rig = Rig(10)
+    rig.expect([body_spoilt, body_spoilt, packet_lost])
+    assert isinstance(rig.ask(10, b"v100"), UnknownOutcome)
+
+
+def test_no_answer_is_late_while_the_packet_still_waits_for_the_line() -> None:
+    bench_kernel = Kernel()
+    bus = Bus(bench_kernel, KIND.protocol)
+    bus.add(KIND.create(10, SacSettings(), bus.rate, bus.tell))
+    outcomes: list[object] = []
+    port = Port(bus.medium, lambda heard, _now: caller.hear(heard.data), latency=0)
+    caller = Caller(bench_kernel, port.talk, unsent=lambda: port.unsent)
+    # Somebody else talks for 104 ms.
+    bus.medium.transmit("another talker", bytes(400), 0)
+    caller.call(10, b"m400", outcomes.append)
+    bench_kernel.run()
+    (outcome,) = outcomes
+    assert isinstance(outcome, Acknowledged)
+    assert outcome.attempts == 1

@@ -830,5 +830,54 @@ def test_what_the_hardware_may_not_be_able_to_do_is_obeyed_and_warned_of() -> No
     bench = Bench()
     bench.hears("m2000v700a5d5", at=AT)
     assert {report.kind for report in bench.told()} == {ReportKind.WARNING}
-    assert {report.line for report in bench.told()} == {"m2000v700a5d5"}
+    assert {report.line for report in bench.told()} == {"m2000vc428a5d5"}
     assert settled(bench) == 2000
+
+
+def test_a_held_command_whose_place_was_taken_is_told_lost_and_the_queue_stays_at_30() -> None:
+    bench = Bench()
+    bench.hears("m1000v10s", at=AT)
+    for number in range(1, 31):
+        bench.hears(f"m{number}", at=AT * (number + 1))
+    bench.hears("mv60", at=AT * 40)
+    snapshot = bench.snapshot(AT * 41)
+    assert len(snapshot.pending) == 30
+    overrun = [one.text for one in bench.told() if one.kind is ReportKind.OVERRUN]
+    assert overrun == ["m1000vc30000a1d1 was held, and is overwritten"]
+    bench.hears("m31", at=AT * 42)
+    assert len(bench.snapshot(AT * 43).pending) == 30
+
+
+def test_continuous_motion_waits_for_a_stop_with_grace_that_is_on_its_way() -> None:
+    bench = Bench()
+    bench.hears("mv110a5d1", at=AT)
+    bench.hears("s", at=SECOND)
+    bench.hears("mv300", at=SECOND + 100 * MS)
+    rpms = [bench.snapshot(SECOND + 110 * MS + n * 50 * MS).rpm for n in range(8)]
+    assert rpms == sorted(rpms, reverse=True)
+    assert rpms[0] > 60
+    assert bench.snapshot(LONG).rpm == 300
+
+
+def test_a_velocity_that_comes_while_continuous_motion_waits_for_a_pulse_is_its_velocity() -> None:
+    bench = Bench()
+    bench.hears("m50v10", at=AT)
+    bench.hears("mv60", at=SECOND)
+    bench.hears("v120", at=SECOND + 10 * MS)
+    assert bench.snapshot(LONG).rpm == 120
+
+
+def test_a_new_velocity_that_asks_too_much_is_warned_of() -> None:
+    bench = Bench()
+    bench.hears("mv60", at=AT)
+    bench.hears("v200000", at=SECOND)
+    assert {one.kind for one in bench.told()} == {ReportKind.WARNING}
+
+
+def test_what_stands_behind_a_space_is_told_to_be_ignored_unless_it_is_padding() -> None:
+    bench = Bench()
+    bench.hears("m500 200", at=AT)
+    bench.hears("m500  ", at=2 * AT)
+    assert [(one.kind, one.line, one.column) for one in bench.told()] == [
+        (ReportKind.IGNORED, "m500 200", 5)
+    ]

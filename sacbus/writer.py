@@ -1,0 +1,84 @@
+"""Standard output that nobody can hold up: what a reader does not take in time is lost, counted.
+
+Owns the thread that writes. Reports come from within the bus; were they written there, a reader
+that stops reading would stop the bus, its signals included. A leaf beside the command line.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import os
+import queue
+import sys
+import threading
+from collections.abc import Callable
+from typing import Final
+
+__all__ = ["Writer"]
+
+#: Texts that wait at most; a reader so far behind is not reading.
+WAITING: Final = 1_000
+
+#: Seconds that :meth:`Writer.close` gives a slow reader to take the rest.
+PATIENCE: Final = 2.0
+
+
+class Writer:
+    """Writes texts in order, from a thread of its own. To be made in a running event loop.
+
+    ``lost`` is told once, in the loop, when nothing can be written any more. ``missed(count)``
+    gives the text that stands where texts are missing.
+    """
+
+    def __init__(self, lost: Callable[[OSError], None], missed: Callable[[int], str]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._lost: Callable[[OSError], None] | None = lost
+        self._missed_text = missed
+        self._missed = 0
+        self._texts: queue.Queue[str | None] = queue.Queue(WAITING)
+        try:
+            # The descriptor itself: a buffer's lock, held by a thread that waits, blocks the exit.
+            self._output: int | None = sys.stdout.fileno()
+        except io.UnsupportedOperation:  # replaced, as in tests
+            self._output = None
+        self._thread = threading.Thread(target=self._run, name="sacbus output", daemon=True)
+        self._thread.start()
+
+    def say(self, text: str) -> None:
+        """Have a text written; never waits and never raises."""
+        try:
+            if self._missed:
+                self._texts.put_nowait(self._missed_text(self._missed))
+                self._missed = 0
+            self._texts.put_nowait(text)
+        except queue.Full:
+            self._missed += 1
+
+    def close(self) -> None:
+        """Have the rest written, as far as it is taken in time."""
+        try:
+            self._texts.put(None, timeout=PATIENCE)
+        except queue.Full:
+            return
+        self._thread.join(PATIENCE)
+
+    def _run(self) -> None:
+        while (text := self._texts.get()) is not None:
+            if self._lost is None:
+                continue
+            try:
+                self._write(text)
+            except OSError as fault:
+                lost, self._lost = self._lost, None
+                # The loop may be closed already, when the last lines go to nobody.
+                if not self._loop.is_closed():
+                    self._loop.call_soon_threadsafe(lost, fault)
+
+    def _write(self, text: str) -> None:
+        if self._output is None:
+            sys.stdout.write(text)
+            return
+        rest = text.encode(sys.stdout.encoding, "replace")
+        while rest:
+            rest = rest[os.write(self._output, rest) :]
