@@ -337,3 +337,17 @@ def test_a_terminal_that_is_closed_ends_serve_in_order(tmp_path: Path) -> None:
         finally:
             process.kill()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_reader_that_stops_reading_stops_neither_the_bus_nor_its_end(tmp_path: Path) -> None:
+    with served("--ephemeral", "--no-pace", "--pty", str(tmp_path / "port")) as sacbus:
+        with client(sacbus.link) as port:
+            # Each is reported in a line of its own: more than a pipe and the writer hold.
+            for _ in range(3_000):
+                port.write(encode(10, 1, b"no such command, to fill a line with words"))
+                assert port.read(4) == bytes.fromhex("02 01 0a 06")
+        # Nobody has read a report so far, and it ends in order all the same.
+        sacbus.process.send_signal(signal.SIGTERM)
+        assert sacbus.process.wait(PATIENCE) == 0
+    assert list(tmp_path.iterdir()) == []

@@ -43,7 +43,10 @@ class SacProtocol:
     rate = LineRate()
 
     def cuts(self, data: bytes) -> Sequence[int]:
-        """The ends of all trigger bytes but one that ends the data itself."""
+        """The ends of all trigger bytes, and of the bytes behind them, but the end of the data.
+
+        A device acts at its trigger byte; with ``receiver = "robust"`` a node acts at the NUL.
+        """
         if data[0] != STX:
             return _cuts_going_on(data)
         first = data.find(b"\x03")
@@ -53,7 +56,8 @@ class SacProtocol:
         # Nearly always: one packet, ETX CRC NUL.
         if first == size - 3 and data[first + 1] > 3:
             return (size - 1,)
-        return [end for hit in _TRIGGER.finditer(data) if (end := hit.end()) < size]
+        ends = [hit.end() for hit in _TRIGGER.finditer(data)]
+        return sorted({cut for end in ends for cut in (end, end + 1) if cut < size})
 
     def addressed(self, data: bytes) -> Sequence[int] | None:
         """Destinations named in the data; everyone for a general call.
@@ -92,7 +96,8 @@ def _cuts_going_on(data: bytes) -> list[int]:
     going_on = _GOING_ON.match(data)
     assert going_on is not None  # it matches nothing as well
     ends = {1, *(going_on.end(group) for group in (1, 2, 3))}
-    ends.update(hit.end() for hit in _TRIGGER.finditer(data))
+    for hit in _TRIGGER.finditer(data):
+        ends.update((hit.end(), hit.end() + 1))
     return sorted(end for end in ends if 0 < end < len(data))
 
 

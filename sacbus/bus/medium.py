@@ -182,9 +182,12 @@ class Medium:
             arrived = data[first:upto] if sent.hits is None else self._spoilt(sent, first, upto)
             heard = Heard(arrived, sent.start, first, self.rate, data[upto:])
             self._router.deliver(heard, sent.sender, now)
-        # Listeners hear whole frames: all cuts but the last, and the end. (What follows the last
-        # cut of a single packet is its NUL; to hear that apart would only cost them.)
-        if place.listeners and (upto == size or step < len(cuts) - 1):
+        # Listeners hear whole frames: up to a cut that is not followed by another a byte later, and
+        # at the end. (What follows the last cut of a packet is its NUL; to hear that apart would
+        # only cost them.)
+        if place.listeners and (
+            upto == size or (step < len(cuts) - 1 and cuts[step + 1] > upto + 1)
+        ):
             if heard is None or sent.to_listeners != sent.to_nodes:
                 first = sent.to_listeners
                 heard = Heard(

@@ -82,12 +82,7 @@ def test_listeners_hear_packets_that_follow_each_other_one_by_one() -> None:
     first, second = packet("m200"), packet("v100", 10)
     medium.transmit(object(), first + second + first, 0)
     kernel.run()
-    # Each when its CRC is in, and what is behind it with the next.
-    assert [data for _, _, data in ear.heard] == [
-        first[:-1],
-        first[-1:] + second[:-1],
-        second[-1:] + first,
-    ]
+    assert [data for _, _, data in ear.heard] == [first, second, first]
 
 
 def test_a_line_is_free_when_the_last_of_all_transmissions_ends() -> None:
@@ -206,9 +201,9 @@ def test_what_was_delivered_before_the_overlap_stays_delivered() -> None:
     # Into the last instant of the second packet's CRC.
     kernel.at(RATE.span(len(first + second) - 1) - 1, medium.transmit, object(), b"X", 0)
     kernel.run()
-    assert ear.heard[0] == (0, RATE.span(len(first) - 1), first[:-1])
-    rest = next(data for start, _, data in ear.heard if start == RATE.span(len(first) - 1))
-    assert rest[:-2] == first[-1:] + second[:-2]
+    assert ear.heard[0] == (0, RATE.span(len(first)), first)
+    rest = next(data for start, _, data in ear.heard if start == RATE.span(len(first)))
+    assert rest[:-2] == second[:-2]
     assert rest[-2] != second[-2]
     assert rest[-1] != second[-1]
 

@@ -37,9 +37,9 @@ def test_it_is_one_pair_of_wires_at_38400_baud() -> None:
         (PACKET, [9]),
         (PACKET[:-1], []),
         (ack(1, NODE), []),
-        (PACKET + PACKET, [9, 19]),
+        (PACKET + PACKET, [9, 10, 19]),
         (encode(NODE, 1, b"m200", crc=False), []),
-        (encode(NODE, 1, b"a\x03\x00b"), [6, 9]),
+        (encode(NODE, 1, b"a\x03\x00b"), [6, 7, 9]),
         # ETX before the source: the byte after the source is the trigger.
         (b"\x02\x52\x03\x01\x41\x41", [5]),
         (b"\x02\x52\x01\x03\x03\x03\xa5\x00", [7]),
@@ -47,7 +47,7 @@ def test_it_is_one_pair_of_wires_at_38400_baud() -> None:
         # it, and its first byte may put an answer off.
         (b"\xa5\x00", [1]),
         (b"\x03\xa5\x00", [1, 2]),
-        (b"\x52\x03\x01\x03\xa5\x41\x41", [1, 3, 5]),
+        (b"\x52\x03\x01\x03\xa5\x41\x41", [1, 3, 4, 5, 6]),
         (b"abcdef", [1, 2, 3]),
         (b"\x03\x03", [1]),
         (b"\x00" + PACKET, [1, 10]),

@@ -107,3 +107,14 @@ def test_a_node_with_it_reports_what_is_too_long() -> None:
     bench.run()
     assert bench.answers == []
     assert [report.kind for report in bench.told()] == [ReportKind.LOST]
+
+
+@pytest.mark.parametrize("behind", [packet("m" + "1" * 45, 99), b"noise" * 200])
+def test_a_node_with_it_answers_at_once_whatever_its_sender_goes_on_with(behind: bytes) -> None:
+    alone, followed = Bench(settings=ROBUST, lanes=2), Bench(settings=ROBUST, lanes=2)
+    alone.sends(packet("m200"), at=AT)
+    followed.sends(packet("m200") + behind, at=AT)
+    for bench in (alone, followed):
+        bench.run()
+    assert followed.heard == alone.heard
+    assert followed.heard[0].data == ACKED
