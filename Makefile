@@ -42,7 +42,7 @@ coverage: $(VENV)/dev
 check: $(VENV)/dev
 	@$(BIN)/ruff format --check --quiet .
 	@$(BIN)/ruff check --quiet .
-	@$(BIN)/mypy sacbus nodes tests
+	@$(BIN)/mypy sacbus nodes tests benchmarks examples
 	@$(BIN)/lint-imports --no-logo
 	@$(BIN)/codespell
 	@$(BIN)/python -m doctest README.md docs/*.md

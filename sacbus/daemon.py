@@ -92,10 +92,10 @@ class HostedBus:
         tuning = Tuning(link, self.bus.rate.baud, Random(self.configuration.seed), tell)
 
         def hear(heard: Heard, _now: int) -> None:
-            link.send(tuning.pass_on(heard.data))
+            link.send(tuning.to_client(heard.data))
 
         def deliver(data: bytes) -> None:
-            self.host.arrive(port.talk, tuning.pass_on(data))
+            self.host.arrive(port.talk, tuning.from_client(data))
 
         link.open(deliver)
         self.links.append(link)

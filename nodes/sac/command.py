@@ -408,5 +408,6 @@ def shortest(motion: Motion) -> str:
         acc100=motion.acc100,
         dec100=motion.dec100,
         linear=motion.linear or None,
+        extra_pulses=motion.extra_pulses or None,
         pulses=motion.pulses or None,
     ).text()

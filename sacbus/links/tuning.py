@@ -19,6 +19,10 @@ __all__ = ["Tuning"]
 #: the last bit is wrong beyond 5 %, and half of that is what data sheets leave to each side.
 TOLERANCE: Final = 2.5
 
+#: Asking for the client's rate costs the system a call; after bytes from it, so many packets to it
+#: do without.
+TRUST: Final = 8
+
 
 class Tuning:
     """Between a link and a line of ``baud``: passes bytes on as they are, or spoilt.
@@ -27,7 +31,7 @@ class Tuning:
     sentence each time the client's rate turns out to be a new wrong one.
     """
 
-    __slots__ = ("_baud", "_link", "_noise", "_tell", "_told", "spoilt")
+    __slots__ = ("_baud", "_link", "_noise", "_right", "_tell", "_told", "_trust", "spoilt")
 
     def __init__(self, link: Link, baud: int, noise: Random, tell: Callable[[str], object]) -> None:
         self._link = link
@@ -35,20 +39,38 @@ class Tuning:
         self._noise = noise
         self._tell = tell
         self._told: int | None = None
+        self._right = True
+        #: How often what the client's last bytes showed is taken to hold for bytes to it.
+        self._trust = 0
         #: Bytes spoilt so far, in both directions.
         self.spoilt = 0
 
-    def pass_on(self, data: bytes) -> bytes:
-        """What arrives of ``data`` at the other side, now."""
+    def from_client(self, data: bytes) -> bytes:
+        """What arrives on the line of ``data`` from the client, now."""
+        self._look()
+        self._trust = TRUST
+        return data if self._right else self._spoil(data)
+
+    def to_client(self, data: bytes) -> bytes:
+        """What arrives at the client of ``data`` from the line, now."""
+        if self._trust:
+            self._trust -= 1
+        else:
+            self._look()
+        return data if self._right else self._spoil(data)
+
+    def _look(self) -> None:
         rate = self._link.client_baud()
-        if rate is None or abs(rate - self._baud) * 100 <= TOLERANCE * self._baud:
+        self._right = rate is None or abs(rate - self._baud) * 100 <= TOLERANCE * self._baud
+        if self._right:
             self._told = None
-            return data
-        if rate != self._told:
+        elif rate != self._told:
             self._told = rate
             self._tell(
                 f"the program on {self._link.where} has set {rate} baud, the line runs at "
                 f"{self._baud}: bytes arrive garbled"
             )
+
+    def _spoil(self, data: bytes) -> bytes:
         self.spoilt += len(data)
         return bytes(byte ^ self._noise.randrange(1, 256) for byte in data)
