@@ -101,6 +101,15 @@ def _setting(
     return settings
 
 
+_baud = click.option(
+    "--baud",
+    type=click.IntRange(300, 4_000_000),
+    default=38_400,
+    show_default=True,
+    help="Line rate.",
+)
+
+
 @root.command()
 @click.option(
     "--nodes",
@@ -131,13 +140,7 @@ def _setting(
     metavar="PATH",
     help="Make PATH a stable symlink to the bus's pty; without it, only the pty's own name.",
 )
-@click.option(
-    "--baud",
-    type=click.IntRange(300, 4_000_000),
-    default=38_400,
-    show_default=True,
-    help="Line rate.",
-)
+@_baud
 @click.option(
     "--state",
     type=click.Path(path_type=Path, file_okay=False),
@@ -199,13 +202,7 @@ def serve(
 @root.command()
 @click.argument("link")
 @click.argument("line")
-@click.option(
-    "--baud",
-    type=click.IntRange(300, 4_000_000),
-    default=38_400,
-    show_default=True,
-    help="Line rate.",
-)
+@_baud
 @click.option(
     "--accept-duplicates",
     is_flag=True,
