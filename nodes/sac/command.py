@@ -35,6 +35,8 @@ __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand", "shortest"]
 #: Positions of the command queue (manual, "Throw-away").
 QUEUE_LENGTH: Final = 30
 
+US_PER_MINUTE: Final = 60_000_000
+
 #: The commands that end here; a message processor deals with the others itself.
 MotionCommand = (
     Move
@@ -219,7 +221,10 @@ class CommandProcessor:
             if self._held_at is not None and self._queue[self._held_at] is held:
                 self._pending.appendleft(self._held_at)
             else:
-                self._tell(ReportKind.OVERRUN, f"{shortest(held)} was held, and is overwritten")
+                self._tell(
+                    ReportKind.OVERRUN,
+                    f"{shortest(held, self._drive)} was held, and is overwritten",
+                )
         self._preempting = motion
         if not self._stopping:  # what comes while the motor slows down waits for that
             self._cut(now)
@@ -271,7 +276,7 @@ class CommandProcessor:
 
     def _warn(self, profile: Profile) -> None:
         for warning in profile.warnings:
-            self._tell(ReportKind.WARNING, str(warning), shortest(profile.motion))
+            self._tell(ReportKind.WARNING, str(warning), shortest(profile.motion, self._drive))
 
     def _finish(self, end: Ns) -> None:
         """House-keeping in STOP: the present command ends at ``end``."""
@@ -399,12 +404,18 @@ class CommandProcessor:
         self._engine.step(signs.count("+") - signs.count("-"))
 
 
-def shortest(motion: Motion) -> str:
-    """A resolved command in the manual's shortest form, with all that shapes its profile."""
+def shortest(motion: Motion, drive: Drive) -> str:
+    """A resolved command in the manual's shortest form, with all that shapes its profile.
+
+    Its velocity in RPM where that gives this very cycle, as ``v100`` gives 3000 us.
+    """
+    rpm = motion.rpm
+    by_rpm = rpm > 0 and US_PER_MINUTE // (drive.steps_per_rev * rpm) == motion.cycle_us
     return Move(
         steps=motion.steps,
         opposite=not motion.cw,
-        cycle_us=motion.cycle_us,
+        rpm=rpm if by_rpm else None,
+        cycle_us=None if by_rpm else motion.cycle_us,
         acc100=motion.acc100,
         dec100=motion.dec100,
         linear=motion.linear or None,

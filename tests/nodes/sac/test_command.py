@@ -189,7 +189,7 @@ def test_velocity_and_ramps_of_a_command_become_the_session_defaults_and_nothing
     bench.run()
     bench.hears("m10", at=LONG)
     current = bench.snapshot(LONG + LOAD).current
-    assert current == "m10vc5000a2d3l1"
+    assert current == "m10v60a2d3l1"
     before = bench.position(LONG)
     assert settled(bench) == before + 20
 
@@ -198,14 +198,14 @@ def test_l_brings_its_ramps_own_defaults() -> None:
     bench = Bench()
     bench.hears("m1v10a2d3", at=AT)
     bench.hears("m1v10l1", at=SECOND)
-    assert bench.snapshot(SECOND).current == "m1vc30000a10.47d10.47l1"
+    assert bench.snapshot(SECOND).current == "m1v10a10.47d10.47l1"
 
 
 def test_bare_letters_bring_back_the_system_defaults() -> None:
     bench = Bench()
     bench.hears("m1v10a2d3", at=AT)
     bench.hears("m1vad", at=SECOND)
-    assert bench.snapshot(SECOND).current == "m1vc3000a1d1"
+    assert bench.snapshot(SECOND).current == "m1v100a1d1"
 
 
 # ---- V A D alone --------------------------------------------------------------------------------
@@ -214,13 +214,13 @@ def test_bare_letters_bring_back_the_system_defaults() -> None:
 @pytest.mark.parametrize(
     ("line", "current"),
     [
-        ("v50", "m9vc6000a1d1"),
-        ("V50", "m9vc6000a1d1"),
+        ("v50", "m9v50a1d1"),
+        ("V50", "m9v50a1d1"),
         ("vc4567", "m9vc4567a1d1"),
-        ("v59", "m9vc5084a1d1"),
-        ("a2.5", "m9vc3000a2.5d1"),
-        ("d.25", "m9vc3000a1d.25"),
-        ("a999", "m9vc3000a999d1"),
+        ("v59", "m9v59a1d1"),
+        ("a2.5", "m9v100a2.5d1"),
+        ("d.25", "m9v100a1d.25"),
+        ("a999", "m9v100a999d1"),
     ],
 )
 def test_v_a_and_d_alone_set_what_the_next_command_leaves_out(line: str, current: str) -> None:
@@ -232,7 +232,7 @@ def test_v_a_and_d_alone_set_what_the_next_command_leaves_out(line: str, current
     for number, bare in enumerate("vad"):
         bench.hears(bare, at=LONG + number * SECOND)
     bench.hears("m9", at=LONG * 2)
-    assert bench.snapshot(LONG * 2).current == "m9vc3000a1d1"
+    assert bench.snapshot(LONG * 2).current == "m9v100a1d1"
 
 
 def test_session_velocity_does_not_touch_a_move_that_runs() -> None:
@@ -270,7 +270,7 @@ def test_thirty_pending_commands_run_in_order() -> None:
         if snapshot.current not in ran[-1:]:
             ran.append(snapshot.current)
         assert bench.kernel.run_next()
-    assert ran[1:] == [f"m{number}vc3000a999d999" for number in range(2, 32)]
+    assert ran[1:] == [f"m{number}v100a999d999" for number in range(2, 32)]
     assert snapshot.position_pulses == sum(range(1, 32))
 
 
@@ -306,7 +306,7 @@ def test_a_command_with_s_is_held_until_y_and_those_behind_it_wait() -> None:
     bench.hears("m5v10", at=AT + 20 * MS)
     snapshot = bench.snapshot(LONG - SECOND)
     assert (snapshot.state, snapshot.position_pulses) == ("SYNC", 0)
-    assert (snapshot.current, snapshot.pending) == ("m1vc30000a1d1", ("m5vc30000a1d1",))
+    assert (snapshot.current, snapshot.pending) == ("m1v10a1d1", ("m5v10a1d1",))
     bench.hears("y", at=LONG)
     assert bench.position(LONG - 1) == 0
     assert bench.position(LONG) == 1
@@ -488,7 +488,7 @@ def test_a_continuous_commands_parameters_are_thrown_away() -> None:
     bench.hears("mv20a2d3", at=AT)
     bench.hears("S", at=SECOND)
     bench.hears("m9", at=2 * SECOND)
-    assert bench.snapshot(2 * SECOND).current == "m9vc3000a1d1"
+    assert bench.snapshot(2 * SECOND).current == "m9v100a1d1"
 
 
 def test_continuous_motion_goes_before_what_runs_and_what_is_pending() -> None:
@@ -502,7 +502,7 @@ def test_continuous_motion_goes_before_what_runs_and_what_is_pending() -> None:
     # Without a gap and without a ramp: the velocity is kept.
     assert pulse_times(bench, at, at + 2 * FAST) == [last + FAST, last + 2 * FAST]
     snapshot = bench.snapshot(LONG)
-    assert (snapshot.current, snapshot.pending) == ("mvc3000a1d1", ("m50vc3000a1d1",))
+    assert (snapshot.current, snapshot.pending) == ("mv100a1d1", ("m50v100a1d1",))
     bench.hears("N", at=LONG + SECOND)
     there = bench.position(LONG + SECOND)
     assert settled(bench) == there + 50
@@ -516,7 +516,7 @@ def test_continuous_motion_does_not_wait_for_one_that_is_held_and_which_is_held_
     bench.hears("mv10", at=SECOND)
     assert bench.position(SECOND + LOAD_ACC) == 1
     snapshot = bench.snapshot(2 * SECOND)
-    assert (snapshot.rpm, snapshot.pending) == (10, ("m5vc30000a1d1",))
+    assert (snapshot.rpm, snapshot.pending) == (10, ("m5v10a1d1",))
     bench.hears("N", at=3 * SECOND)
     snapshot = bench.snapshot(LONG)
     assert (snapshot.state, snapshot.pending) == ("SYNC", ())
@@ -830,7 +830,7 @@ def test_what_the_hardware_may_not_be_able_to_do_is_obeyed_and_warned_of() -> No
     bench = Bench()
     bench.hears("m2000v700a5d5", at=AT)
     assert {report.kind for report in bench.told()} == {ReportKind.WARNING}
-    assert {report.line for report in bench.told()} == {"m2000vc428a5d5"}
+    assert {report.line for report in bench.told()} == {"m2000v700a5d5"}
     assert settled(bench) == 2000
 
 
@@ -843,7 +843,7 @@ def test_a_held_command_whose_place_was_taken_is_told_lost_and_the_queue_stays_a
     snapshot = bench.snapshot(AT * 41)
     assert len(snapshot.pending) == 30
     overrun = [one.text for one in bench.told() if one.kind is ReportKind.OVERRUN]
-    assert overrun == ["m1000vc30000a1d1 was held, and is overwritten"]
+    assert overrun == ["m1000v10a1d1 was held, and is overwritten"]
     bench.hears("m31", at=AT * 42)
     assert len(bench.snapshot(AT * 43).pending) == 30
 

@@ -52,8 +52,8 @@ def test_a_snapshot_shows_what_runs_and_what_waits() -> None:
     assert (snapshot.position_pulses, snapshot.position_steps, snapshot.rpm) == (-3, -1.5, -10)
     assert snapshot.state == "CRUISE"
     assert (snapshot.current, snapshot.pending) == (
-        "m-100vc30000a1d1",
-        ("m20vc5000a2d3l1p",),
+        "m-100v10a1d1",
+        ("m20v60a2d3l1p",),
     )
     assert snapshot.counters == {"packets": 2, "ack": 2, "nak": 0}
 
