@@ -212,5 +212,5 @@ def test_what_a_drive_remembers_of_ramps_changes_no_plan(
 def test_a_drive_does_not_remember_without_bound() -> None:
     drive = Drive()
     for steps in range(5_000):
-        plan(command(400, 100 + steps), drive)
+        plan(command(100_000, 100 + steps), drive)
     assert 0 < len(drive.whole_ramps) <= 4_096
