@@ -30,7 +30,7 @@ BROADCASTS = 100
 
 
 class FullBus:
-    """A bus with some nodes that have sharp ramps, and mother on it."""
+    """A bus with some nodes that have sharp ramps."""
 
     def __init__(self, nodes: int, acceleration: int) -> None:
         self.kernel = Kernel()

@@ -83,7 +83,10 @@ class HostedBus:
         return self.bus.node(address).snapshot(self.host.kernel.now)
 
     def attach(self, link: Link) -> Port:
-        """Put an open link's bytes on the line, and the line's on the link."""
+        """Open a link, put its bytes on the line, and the line's on the link.
+
+        LinkError when it cannot be had. It is closed with the bus.
+        """
         kernel = self.host.kernel
 
         def tell(text: str) -> None:
@@ -123,13 +126,14 @@ class HostedBus:
 
     def close(self) -> None:
         """Let everybody go: links are closed, and mothers are told that the line is gone."""
-        for link in self.links:
-            link.close()
-        for port in self._ports:
-            port.close()
-        for mother in self._mothers:
-            mother.lose("the bus is closed")
-        self.host.close()
+        with ExitStack() as stack:  # the rest is closed also when a link cannot be
+            stack.callback(self.host.close)
+            for mother in self._mothers:
+                stack.callback(mother.lose, "the bus is closed")
+            for port in self._ports:
+                stack.callback(port.close)
+            for link in self.links:
+                stack.callback(link.close)
 
     def save(self, state: StateDirectory) -> None:
         """Write every node's memory; StateError for the first that could not be written."""

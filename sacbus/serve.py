@@ -32,7 +32,7 @@ HUNG_UP: Final = 129
 #: The table is drawn this often; faster than this the eye does not read numbers.
 REFRESH: Final = 0.2
 
-#: Reports that stand above the table each second at most; the rest are counted.
+#: Reports that are put above the table between two drawings at most; the rest are counted.
 REPORTS_A_REFRESH: Final = 5
 
 

@@ -16,7 +16,7 @@ from sacbus import open_bus
 from sacbus.daemon import Configuration, HostedBus
 from sacbus.host import run_virtual
 from sacbus.kernel import MS, SECOND, Kernel
-from sacbus.links import MemoryLink, PathTaken, PtyLink
+from sacbus.links import LinkError, MemoryLink, PathTaken, PtyLink
 from sacbus.mother import LineLost
 from sacbus.node import KindError, SettingError
 from sacbus.state import StateDirectory, StateError
@@ -539,3 +539,24 @@ def test_a_client_may_write_from_within_what_it_hears() -> None:
             return heard
 
     assert asyncio.run(scene()) == ["02010a06", "02010b06"]
+
+
+class StuckLink(MemoryLink):
+    """A link that cannot take down what it stands behind, such as a symlink in a locked folder."""
+
+    def close(self) -> None:
+        super().close()
+        raise LinkError("cannot remove the symlink", self.where, "remove it by hand")
+
+
+def test_a_link_that_cannot_be_closed_is_told_and_keeps_nothing_else_open(tmp_path: Path) -> None:
+    async def scene() -> None:
+        with pytest.raises(LinkError, match="cannot remove the symlink"):
+            async with open_bus(Configuration(pty=tmp_path / "port")) as bus:
+                bus.attach(StuckLink())
+                mother = bus.mother()
+        assert list(tmp_path.iterdir()) == []
+        with pytest.raises(LineLost):
+            await mother.send(10, "y")
+
+    asyncio.run(scene())

@@ -17,6 +17,7 @@ from sacbus.kernel import Ns
 from sacbus.language import (
     Acceleration,
     Deceleration,
+    Defaults,
     Motion,
     Move,
     Next,
@@ -34,8 +35,6 @@ __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand", "shortest"]
 
 #: Positions of the command queue (manual, "Throw-away").
 QUEUE_LENGTH: Final = 30
-
-US_PER_MINUTE: Final = 60_000_000
 
 #: The commands that end here; a message processor deals with the others itself.
 MotionCommand = (
@@ -112,7 +111,8 @@ class CommandProcessor:
         #: The start that soft ops have yet to tell.
         self._untold: Ns | None = None
         self._tell = tell
-        #: Position 0 is the manual's hidden one for continuous motion; this list only keeps 1-30.
+        #: Positions 1 to 30. The manual's hidden position 0 keeps nothing: continuous motion is
+        #: thrown away.
         self._queue: list[Motion | None] = [None] * (QUEUE_LENGTH + 1)
         self._position = 1
         self._pending: deque[int] = deque()
@@ -223,7 +223,7 @@ class CommandProcessor:
             else:
                 self._tell(
                     ReportKind.OVERRUN,
-                    f"{shortest(held, self._drive)} was held, and is overwritten",
+                    f"{shortest(held, self.session.defaults)} was held, and is overwritten",
                 )
         self._preempting = motion
         if not self._stopping:  # what comes while the motor slows down waits for that
@@ -276,7 +276,9 @@ class CommandProcessor:
 
     def _warn(self, profile: Profile) -> None:
         for warning in profile.warnings:
-            self._tell(ReportKind.WARNING, str(warning), shortest(profile.motion, self._drive))
+            self._tell(
+                ReportKind.WARNING, str(warning), shortest(profile.motion, self.session.defaults)
+            )
 
     def _finish(self, end: Ns) -> None:
         """House-keeping in STOP: the present command ends at ``end``."""
@@ -404,13 +406,13 @@ class CommandProcessor:
         self._engine.step(signs.count("+") - signs.count("-"))
 
 
-def shortest(motion: Motion, drive: Drive) -> str:
+def shortest(motion: Motion, defaults: Defaults) -> str:
     """A resolved command in the manual's shortest form, with all that shapes its profile.
 
     Its velocity in RPM where that gives this very cycle, as ``v100`` gives 3000 us.
     """
     rpm = motion.rpm
-    by_rpm = rpm > 0 and US_PER_MINUTE // (drive.steps_per_rev * rpm) == motion.cycle_us
+    by_rpm = rpm > 0 and defaults.cycle_of(rpm) == motion.cycle_us
     return Move(
         steps=motion.steps,
         opposite=not motion.cw,

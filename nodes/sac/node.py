@@ -90,7 +90,7 @@ class SacNode:
         held = commands.held
         current = commands.current or held
         pending = commands.pending
-        drive = self._memory.drive()
+        defaults = commands.session.defaults
         return Snapshot(
             address=self.address,
             kind=self.kind,
@@ -98,8 +98,8 @@ class SacNode:
             position_steps=pulses / 2**self._memory.ustep,
             position_pulses=pulses,
             rpm=engine.rpm(now),
-            current="" if current is None else shortest(current, drive),
-            pending=tuple(shortest(one, drive) for one in pending),
+            current="" if current is None else shortest(current, defaults),
+            pending=tuple(shortest(one, defaults) for one in pending),
             counters={"packets": network.packets, "ack": network.acks, "nak": network.naks},
         )
 
