@@ -17,7 +17,7 @@ from sacbus.daemon import Configuration, HostedBus
 from sacbus.host import run_virtual
 from sacbus.kernel import MS, SECOND, Kernel
 from sacbus.links import LinkError, MemoryLink, PathTaken, PtyLink
-from sacbus.mother import LineLost
+from sacbus.mother import LineLost, Mother
 from sacbus.node import KindError, SettingError
 from sacbus.state import StateDirectory, StateError
 from sacbus.wire import encode
@@ -550,13 +550,18 @@ class StuckLink(MemoryLink):
 
 
 def test_a_link_that_cannot_be_closed_is_told_and_keeps_nothing_else_open(tmp_path: Path) -> None:
+    mothers: list[Mother] = []
+
+    async def hosting() -> None:
+        async with open_bus(Configuration(pty=tmp_path / "port")) as bus:
+            bus.attach(StuckLink())
+            mothers.append(bus.mother())
+
     async def scene() -> None:
         with pytest.raises(LinkError, match="cannot remove the symlink"):
-            async with open_bus(Configuration(pty=tmp_path / "port")) as bus:
-                bus.attach(StuckLink())
-                mother = bus.mother()
+            await hosting()
         assert list(tmp_path.iterdir()) == []
         with pytest.raises(LineLost):
-            await mother.send(10, "y")
+            await mothers[0].send(10, "y")
 
     asyncio.run(scene())
