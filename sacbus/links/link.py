@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-__all__ = ["Link", "LinkCounters"]
+__all__ = ["Link", "LinkCounters", "Server"]
 
 
 @dataclass(slots=True)
@@ -24,6 +24,10 @@ class LinkCounters:
     """Bytes that no client got: nobody was there, the buffer was full, or they were left unread."""
     clients: int = 0
     """Times a client opened the other end; several in the same instant may count once."""
+    framing_errors: int = 0
+    """Bytes that came in without a stop bit, where the system counts them (a real port on Linux)."""
+    reconnects: int = 0
+    """Times the other end was lost and found again: an adapter that was unplugged."""
 
 
 class Link(Protocol):
@@ -58,3 +62,30 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Let everybody go; leaves no descriptor and no file. May be called again."""
+
+
+class Server(Protocol):
+    """A place that many programs connect to at once; each of them is a link of its own.
+
+    ``admit`` is called with the link of each program that comes, its far end open already. It opens
+    the link (:meth:`Link.open`) and gives back what the server calls, once, when the program has
+    left; by then the link is closed.
+    """
+
+    @property
+    def kind(self) -> str:
+        """`tcp`, `rfc2217`: what `sacbus serve` prints."""
+
+    @property
+    def where(self) -> str:
+        """What a user opens: a URL; with the port that the system chose, once open."""
+
+    @property
+    def counters(self) -> LinkCounters:
+        """Of all programs together, those included that have left."""
+
+    async def open(self, admit: Callable[[Link], Callable[[], None]]) -> None:
+        """Let programs in. Raises LinkError as Link.open does; may be opened again once closed."""
+
+    def close(self) -> None:
+        """Let everybody go, without waiting; leaves no descriptor. May be called again."""
