@@ -35,7 +35,9 @@ __all__ = [
     "SettingError",
     "Snapshot",
     "find_kind",
+    "kind_names",
     "kinds",
+    "misfits",
     "setting_list",
     "settings_from",
 ]
@@ -268,13 +270,18 @@ def kinds() -> dict[str, NodeKind]:
     return {entry.name: _load(entry) for entry in entries}
 
 
+def kind_names() -> list[str]:
+    """The names of all installed kinds, sorted; none of them is loaded."""
+    return sorted({entry.name for entry in entry_points(group=GROUP)})
+
+
 def find_kind(name: str) -> NodeKind:
     """The kind of that name; :class:`KindError` says which there are."""
     found = entry_points(group=GROUP)
     for entry in found:
         if entry.name == name:
             return _load(entry)
-    have = ", ".join(sorted({entry.name for entry in found})) or "none: is sacbus installed?"
+    have = ", ".join(kind_names()) or "none: is sacbus installed?"
     raise KindError(f"node kind {name!r} is not installed; installed kinds: {have}")
 
 
@@ -313,17 +320,26 @@ def setting_list(model: type[NodeSettings]) -> list[Setting]:
 
 def settings_from(model: type[NodeSettings], given: Mapping[str, object]) -> NodeSettings:
     """Settings checked against their model; SettingError for the first that does not fit."""
-    fields = {one.name: one for one in _fields(model)}
-    for name, value in given.items():
-        known = fields.get(name)
-        if known is None:
-            raise SettingError(f"setting {name!r}: expected one of {', '.join(fields)}")
-        if not _fits(known.metadata, known.default, value):
-            allowed = _allowed(known.metadata, known.default)
-            raise SettingError(f"setting {name!r}: expected {allowed}, got {value!r}")
+    for name, expected in misfits(model, given).items():
+        known = any(name == one.name for one in _fields(model))
+        got = f", got {given[name]!r}" if known else ""
+        raise SettingError(f"setting {name!r}: expected {expected}{got}")
     settings = model(**given)
     object.__setattr__(settings, "given", frozenset(given))
     return settings
+
+
+def misfits(model: type[NodeSettings], given: Mapping[str, object]) -> dict[str, str]:
+    """Every given setting that its model does not take, in order, with what was expected."""
+    fields = {one.name: one for one in _fields(model)}
+    found: dict[str, str] = {}
+    for name, value in given.items():
+        known = fields.get(name)
+        if known is None:
+            found[name] = f"one of {', '.join(fields)}"
+        elif not _fits(known.metadata, known.default, value):
+            found[name] = _allowed(known.metadata, known.default)
+    return found
 
 
 def _fields(model: type[NodeSettings]) -> list[dataclasses.Field[Any]]:

@@ -22,7 +22,9 @@ from sacbus.node import (
     ReportKind,
     SettingError,
     find_kind,
+    kind_names,
     kinds,
+    misfits,
     setting_list,
     settings_from,
 )
@@ -105,6 +107,15 @@ def test_the_first_setting_that_does_not_fit_is_the_one_that_is_named() -> None:
         settings_from(KilnSettings, {"chimneys": 2, "lit": 0, "fuel": 0})
 
 
+def test_all_that_does_not_fit_is_told_at_once_with_what_was_expected() -> None:
+    assert misfits(KilnSettings, {"lit": 1, "fuel": "gas", "colour": 1, "chimneys": 4}) == {
+        "lit": "true or false",
+        "colour": "one of fuel, lit, chimneys",
+        "chimneys": "a whole number from 0 to 3",
+    }
+    assert misfits(KilnSettings, {"fuel": "wood", "lit": True}) == {}
+
+
 def test_settings_are_listed_with_all_that_a_help_text_needs() -> None:
     assert [dataclasses.astuple(setting) for setting in setting_list(KilnSettings)] == [
         ("fuel", "gas", "gas or wood", "what burns"),
@@ -134,6 +145,7 @@ def install(site: Path, entries: str, *, module: str = "", name: str = "thirdpar
 def test_the_projects_own_kind_is_found_by_its_entry_point() -> None:
     assert find_kind("sac") is KIND
     assert kinds()["sac"] is KIND
+    assert "sac" in kind_names()
 
 
 def test_a_kind_that_is_not_installed_is_answered_with_those_that_are() -> None:
@@ -193,4 +205,5 @@ def test_a_kind_that_cannot_be_loaded_is_named_with_its_cause_and_the_others_sti
         assert why in message
         assert message.endswith("mend or uninstall its package")
         assert broken.value.__cause__ is not None
+    assert {"kiln", "sac"} <= set(kind_names())
     assert find_kind("sac") is KIND
