@@ -16,6 +16,7 @@ import tty
 
 from benchmarks import REQUEST
 from sacbus.daemon import Configuration, open_bus
+from sacbus.links.places import PtyAt
 from sacbus.wire import ack
 
 ANSWER = ack(1, 10)
@@ -40,7 +41,7 @@ async def serve_echo() -> None:
 
 
 async def serve_bus(*, pace: bool) -> None:
-    configuration = Configuration(pty=True, pace=pace)
+    configuration = Configuration(links=(PtyAt(),), pace=pace)
     async with open_bus(configuration) as bus:
         print(bus.links[0].where, flush=True)
         await _tell_time()

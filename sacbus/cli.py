@@ -171,6 +171,7 @@ def serve(
     ephemeral: bool,
     no_pace: bool,
     no_table: bool,
+    echo: bool,
     as_json: bool,
     receiver: str | None,
     settings: dict[str, object],
@@ -182,6 +183,7 @@ def serve(
     Example: sacbus serve --nodes 10-19,85 --pty /tmp/sacbus
     """
     from sacbus.daemon import Configuration
+    from sacbus.links.places import PtyAt
     from sacbus.serve import serve as run
     from sacbus.state import default_directory
 
@@ -191,12 +193,12 @@ def serve(
         settings = {**settings, "receiver": receiver}
     configuration = Configuration(
         settings=settings,
-        pty=pty or True,
+        links=(PtyAt(pty, echo=echo),),
         state=None if ephemeral else state or default_directory(),
         pace=not no_pace,
         **given,
     )
-    return asyncio.run(run(configuration, as_json=as_json, show_table=not no_table))
+    return asyncio.run(run([configuration], as_json=as_json, show_table=not no_table))
 
 
 @root.command()

@@ -7,21 +7,24 @@ what was opened is closed again in every case: a port is released, memory is sav
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from random import Random
+from typing import assert_never
 
-from sacbus.bus import Bus, Port
+from sacbus.bus import LATENCY, Bus, LivePort, Port
 from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
-from sacbus.kernel import Kernel, LineRate
-from sacbus.links import Link, PtyLink, Tuning
+from sacbus.kernel import US, Kernel, LineRate, Ns
+from sacbus.links import Link, Tuning
+from sacbus.links.link import Server
+from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt
 from sacbus.mother import Mother
 from sacbus.node import (
     Heard,
-    NodeKind,
+    Protocol,
     Report,
     ReportKind,
     SettingError,
@@ -31,45 +34,68 @@ from sacbus.node import (
 )
 from sacbus.state import StateDirectory, StateError
 
-__all__ = ["Configuration", "HostedBus", "open_bus"]
+__all__ = ["Configuration", "HostedBus", "NodeAt", "check", "open_bus"]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeAt:
+    """A node of a configuration: its address, and the settings of its kind that differ."""
+
+    address: int
+    kind: str = "sac"
+    settings: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
     """One bus: its nodes, its line, its links.
 
-    ``pty``: True for a pty, or the path of a symlink to one. ``state``: the directory for the
-    nodes' EEPROM, None keeps it in memory. ``speed`` scales bus time; ``pace`` False lets the line
-    run ahead of the clock. ``lanes`` overrides the protocol's. ``settings`` are the kind's own.
+    A node that is a mere address is of ``kind``, with ``settings``; a bus without nodes speaks the
+    protocol of ``kind``. ``baud`` and ``lanes`` override the protocol's. ``state``: the directory
+    for the nodes' EEPROM, None keeps it in memory. ``speed`` scales bus time; ``pace`` False lets
+    the line run ahead of the clock.
     """
 
-    nodes: tuple[int, ...] = (10, 11, 12)
+    nodes: tuple[NodeAt | int, ...] = (10, 11, 12)
     kind: str = "sac"
     settings: Mapping[str, object] = field(default_factory=dict)
     name: str = "bus"
-    baud: int = 38_400
+    baud: int | None = None
     lanes: int | None = None
     seed: int = 0
-    pty: bool | Path = False
-    echo: bool = False
+    links: tuple[Place, ...] = ()
     state: Path | None = None
     speed: float = 1.0
     pace: bool = True
+
+    @property
+    def every_node(self) -> tuple[NodeAt, ...]:
+        """All nodes in full."""
+        return tuple(
+            one if isinstance(one, NodeAt) else NodeAt(one, self.kind, self.settings)
+            for one in self.nodes
+        )
 
 
 class HostedBus:
     """A bus that runs: its nodes can be looked at, driven by mother, and connected to."""
 
-    def __init__(self, configuration: Configuration, kind: NodeKind, bus: Bus, host: Host) -> None:
+    def __init__(self, configuration: Configuration, bus: Bus, host: Host) -> None:
         self.configuration = configuration
-        self.kind = kind
         self.bus = bus
         self.host = host
-        self.links: list[Link] = []
-        self._ports: list[Port] = []
+        #: Where programs get in, in the order of the configuration.
+        self.links: list[Link | Server] = []
+        #: Everyone with a port of their own: programs, adapters, mothers.
+        self._ports: list[Port | LivePort] = []
         self._mothers: list[Mother] = []
-        #: Nodes by the address they were configured with, which names their memory.
-        self._configured = dict(zip(configuration.nodes, bus.nodes, strict=True))
+        #: Nodes in the order of the configuration, whose addresses name their memory.
+        self._configured = tuple(zip(configuration.every_node, bus.nodes, strict=True))
+
+    @property
+    def talkers(self) -> int:
+        """How many ports there are now: programs that a server let in, ptys, adapters, mothers."""
+        return len(self._ports)
 
     def snapshots(self) -> list[Snapshot]:
         """All nodes as they are now."""
@@ -82,27 +108,61 @@ class HostedBus:
         self.host.arrive(lambda: None)
         return self.bus.node(address).snapshot(self.host.kernel.now)
 
-    def attach(self, link: Link) -> Port:
+    def tell(self, text: str) -> None:
+        """Report something about the line or a link, now."""
+        kernel = self.host.kernel
+        self.bus.tell(Report(kernel.now, None, ReportKind.WARNING, text))
+
+    def attach(self, link: Link, *, echo: bool = False, latency: Ns = LATENCY) -> Port:
         """Open a link, put its bytes on the line, and the line's on the link.
 
         LinkError when it cannot be had. It is closed with the bus.
         """
-        kernel = self.host.kernel
+        port = self._seat(link, echo=echo, latency=latency)
+        self.links.append(link)
+        return port
 
-        def tell(text: str) -> None:
-            self.bus.tell(Report(kernel.now, None, ReportKind.WARNING, text))
+    def attach_live(self, link: Link) -> LivePort:
+        """Open a link to a real line that this one is to be one with; else as :meth:`attach`."""
 
-        tuning = Tuning(link, self.bus.rate.baud, Random(self.configuration.seed), tell)
+        def deliver(data: bytes) -> None:
+            self.host.arrive(port.talk, data)
 
-        def hear(heard: Heard, _now: int) -> None:
+        link.open(deliver)
+        self.links.append(link)
+        port = LivePort(self.bus.medium, link.send, name=link.where)
+        self._ports.append(port)
+        return port
+
+    async def let_in(self, server: Server, *, echo: bool = False, latency: Ns = LATENCY) -> None:
+        """Open a server; everyone it lets in gets a port as from :meth:`attach`, while they stay.
+
+        What a program had said before it left is still sent.
+        """
+
+        def admit(link: Link) -> Callable[[], None]:
+            port = self._seat(link, echo=echo, latency=latency)
+
+            def gone() -> None:
+                port.leave()
+                self._ports.remove(port)
+
+            return gone
+
+        await server.open(admit)
+        self.links.append(server)
+
+    def _seat(self, link: Link, *, echo: bool, latency: Ns) -> Port:
+        tuning = Tuning(link, self.bus.rate.baud, Random(self.configuration.seed), self.tell)
+
+        def hear(heard: Heard, _now: Ns) -> None:
             link.send(tuning.to_client(heard.data))
 
         def deliver(data: bytes) -> None:
             self.host.arrive(port.talk, tuning.from_client(data))
 
         link.open(deliver)
-        self.links.append(link)
-        port = Port(self.bus.medium, hear, echo=self.configuration.echo)
+        port = Port(self.bus.medium, hear, latency=latency, echo=echo, name=link.where)
         self._ports.append(port)
         return port
 
@@ -112,7 +172,7 @@ class HostedBus:
         def hear(heard: Heard, _now: int) -> None:
             mother.hear(heard.data)
 
-        port = Port(self.bus.medium, hear, latency=0)
+        port = Port(self.bus.medium, hear, latency=0, name="mother")
         self._ports.append(port)
         mother = Mother(
             self.host.kernel,
@@ -138,9 +198,9 @@ class HostedBus:
     def save(self, state: StateDirectory) -> None:
         """Write every node's memory; StateError for the first that could not be written."""
         failed: StateError | None = None
-        for address, node in self._configured.items():
+        for wanted, node in self._configured:
             try:
-                state.save(address, self.kind.name, node.persist())
+                state.save(wanted.address, wanted.kind, node.persist())
             except StateError as fault:  # the others' memories are worth no less
                 failed = failed or fault
         if failed is not None:
@@ -156,16 +216,13 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
     LinkError, each a line that a user can act on, with nothing left open.
     """
     configuration = configuration or Configuration()
-    _check(configuration)
-    kind = find_kind(configuration.kind)
-    settings = settings_from(kind.settings, configuration.settings)
+    protocol = check(configuration)
     loop = asyncio.get_running_loop()
-    virtual = isinstance(loop, VirtualLoop)
     kernel = loop.kernel if isinstance(loop, VirtualLoop) else Kernel()
-    rate = LineRate(configuration.baud, kind.protocol.rate.bits)
+    rate = LineRate(configuration.baud or protocol.rate.baud, protocol.rate.bits)
     bus = Bus(
         kernel,
-        kind.protocol,
+        protocol,
         name=configuration.name,
         rate=rate,
         lanes=configuration.lanes,
@@ -177,31 +234,21 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
             state = StateDirectory(configuration.state, configuration.name)
             state.claim()
             stack.callback(state.release)
-        for address in configuration.nodes:
-            node = kind.create(address, settings, rate, bus.tell)
+        for wanted in configuration.every_node:
+            kind = find_kind(wanted.kind)
+            settings = settings_from(kind.settings, wanted.settings)
+            node = kind.create(wanted.address, settings, rate, bus.tell)
             if state is not None:
-                memory, remark = state.load(address, kind.name)
+                memory, remark = state.load(wanted.address, kind.name)
                 if remark is not None:
-                    bus.tell(Report(kernel.now, address, ReportKind.WARNING, remark))
+                    bus.tell(Report(kernel.now, wanted.address, ReportKind.WARNING, remark))
                 if memory is not None:
                     node.restore(memory)
             bus.add(node)
-        host: Host
-        if virtual:
-            host = VirtualHost(kernel)
-        else:
-            lane = bus.medium.master_lane
-            host = RealHost(
-                kernel,
-                loop,
-                speed=configuration.speed,
-                line_free_at=None if configuration.pace else lambda: bus.medium.free_at(lane),
-            )
-        hosted = HostedBus(configuration, kind, bus, host)
+        hosted = HostedBus(configuration, bus, _host(configuration, bus, loop))
         stack.callback(hosted.close)
-        if configuration.pty:
-            path = configuration.pty if isinstance(configuration.pty, Path) else None
-            hosted.attach(PtyLink(path, baud=configuration.baud))
+        for place in configuration.links:
+            await _open_link(hosted, place)
         if state is not None:
             # Last, so that a bus that never ran overwrites nobody's memory; and at once, so that
             # what is killed has left as much as what is ended.
@@ -210,17 +257,79 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
         yield hosted
 
 
-def _check(configuration: Configuration) -> None:
-    """Refuse what no SAC and no line can be, and two nodes that would share a memory."""
+def _host(configuration: Configuration, bus: Bus, loop: asyncio.AbstractEventLoop) -> Host:
+    if isinstance(loop, VirtualLoop):
+        return VirtualHost(bus.kernel)
+    lane = bus.medium.master_lane
+    return RealHost(
+        bus.kernel,
+        loop,
+        speed=configuration.speed,
+        line_free_at=None if configuration.pace else lambda: bus.medium.free_at(lane),
+    )
+
+
+async def _open_link(bus: HostedBus, place: Place) -> None:
+    """Open what a place names. Each kind of link is loaded only where one is asked for."""
+    # ruff: noqa: PLC0415 (no bus waits for, or fails over, what another one needs)
+    baud = bus.bus.rate.baud
+    match place:
+        case PtyAt(path, echo, latency_us):
+            from sacbus.links import PtyLink
+
+            bus.attach(PtyLink(path, baud=baud), echo=echo, latency=latency_us * US)
+        case TcpAt(host, port, echo, latency_us):
+            from sacbus.links.tcp import TcpServer
+
+            await bus.let_in(TcpServer(host, port), echo=echo, latency=latency_us * US)
+        case Rfc2217At(host, port, echo, latency_us):
+            from sacbus.links.rfc2217 import Rfc2217Server
+
+            server = Rfc2217Server(host, port, baud=baud)
+            await bus.let_in(server, echo=echo, latency=latency_us * US)
+        case AdapterAt(path, rts, echo):
+            from sacbus.links.adapter import AdapterLink
+
+            bus.attach_live(AdapterLink(path, baud, rts=rts, echo=echo, tell=bus.tell))
+        case _:
+            assert_never(place)
+
+
+def check(configuration: Configuration) -> Protocol:
+    """Refuse what no node and no line can be, and two nodes that would share a memory.
+
+    SettingError or KindError for the first mistake; otherwise the protocol that all nodes speak.
+    """
     if not 0 < configuration.speed < inf:
         raise SettingError(f"speed: expected a number above 0, got {configuration.speed}")
-    if not 300 <= configuration.baud <= 4_000_000:
+    if configuration.baud is not None and not 300 <= configuration.baud <= 4_000_000:
         raise SettingError(f"baud: expected 300 to 4000000, got {configuration.baud}")
     if configuration.lanes not in (None, 1, 2):
         raise SettingError(f"lanes: expected 1 or 2, got {configuration.lanes}")
-    nodes = configuration.nodes
-    for number, address in enumerate(nodes):
-        if not 4 <= address <= 255:
-            raise SettingError(f"nodes: expected addresses from 4 to 255, got {address!r}")
-        if address in nodes[:number]:
-            raise SettingError(f"nodes: expected every address once, got {address} twice")
+    protocol = find_kind(configuration.kind).protocol
+    seen: set[int] = set()
+    nodes = configuration.every_node
+    for number, node in enumerate(nodes):
+        if not 4 <= node.address <= 255:
+            raise SettingError(f"nodes: expected addresses from 4 to 255, got {node.address!r}")
+        if node.address in seen:
+            raise SettingError(f"nodes: expected every address once, got {node.address} twice")
+        seen.add(node.address)
+        kind = find_kind(node.kind)
+        settings_from(kind.settings, node.settings)
+        if number == 0:
+            protocol = kind.protocol
+        elif kind.protocol.name != protocol.name:
+            raise SettingError(
+                f"nodes: expected one protocol on a line, got {protocol.name} (node "
+                f"{nodes[0].address}) and {kind.protocol.name} (node {node.address})"
+            )
+    if any(isinstance(place, AdapterAt) for place in configuration.links):
+        if configuration.speed != 1:
+            raise SettingError(
+                f"speed: expected 1 with a real adapter, which keeps real time, got "
+                f"{configuration.speed}"
+            )
+        if not configuration.pace:
+            raise SettingError("pace: expected true with a real adapter, which keeps real time")
+    return protocol

@@ -54,7 +54,8 @@ class Heard:
 
     ``data`` is what came over the wire, garbled where transmissions overlapped. Its first byte is
     number ``first`` of a transmission that started at ``start``; all its bytes follow each other
-    without a pause. ``following`` is what its sender goes on with behind ``data``: a device sees
+    without a pause. ``ninth`` holds a 0 or 1 for each of them where the line has ninth bits and the
+    sender sent some. ``following`` is what its sender goes on with behind ``data``: a device sees
     each of these bytes begin in time, so it may take into account that they come, and when. What
     they turn out to be is heard later, if at all.
     """
@@ -64,6 +65,7 @@ class Heard:
     first: int
     rate: LineRate
     following: bytes
+    ninth: bytes | None = None
 
     def begins(self, index: int) -> Ns:
         """When byte ``index`` of ``data`` began (its start bit)."""

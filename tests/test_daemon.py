@@ -17,6 +17,7 @@ from sacbus.daemon import Configuration, HostedBus
 from sacbus.host import run_virtual
 from sacbus.kernel import MS, SECOND, Kernel
 from sacbus.links import LinkError, MemoryLink, PathTaken, PtyLink
+from sacbus.links.places import PtyAt
 from sacbus.mother import LineLost, Mother
 from sacbus.node import KindError, SettingError
 from sacbus.state import StateDirectory, StateError
@@ -117,9 +118,9 @@ def test_a_client_on_a_link_is_answered_with_the_lines_times() -> None:
 
 def test_echo_gives_a_client_its_own_bytes_back() -> None:
     async def scene(*, echo: bool) -> bytes:
-        async with open_bus(Configuration(echo=echo)) as bus:
+        async with open_bus() as bus:
             link = MemoryLink()
-            bus.attach(link)
+            bus.attach(link, echo=echo)
             client = link.client()
             client.write(encode(10, 1, b"m400"))
             await asyncio.sleep(10)
@@ -187,7 +188,7 @@ def test_mother_starts_as_soon_as_the_line_is_free() -> None:
         (Configuration(settings={"ustep": 9}), SettingError, "whole number from 0 to 7, got 9"),
         (Configuration(settings={"colour": 1}), SettingError, "setting 'colour'"),
         (Configuration(state=Path("/dev/null/x")), StateError, "cannot create the state directory"),
-        (Configuration(pty=Path("/dev/null")), PathTaken, "/dev/null"),
+        (Configuration(links=(PtyAt(Path("/dev/null")),)), PathTaken, "/dev/null"),
     ],
 )
 def test_what_cannot_be_opened_is_told_in_one_line(
@@ -234,7 +235,7 @@ def test_memory_is_saved_when_the_scene_fails_too(tmp_path: Path) -> None:
 
 def test_a_bus_that_could_not_open_saves_nothing(tmp_path: Path) -> None:
     (tmp_path / "port").touch()
-    configuration = Configuration(state=tmp_path / "state", pty=tmp_path / "port")
+    configuration = Configuration(state=tmp_path / "state", links=(PtyAt(tmp_path / "port"),))
 
     async def scene() -> None:
         async with open_bus(configuration):
@@ -369,7 +370,7 @@ def test_250_nodes_answer_a_round_over_a_pty_each_ack_from_the_right_one() -> No
         return answers
 
     async def scene() -> None:
-        everybody = Configuration(nodes=tuple(addresses), pty=True, pace=False)
+        everybody = Configuration(nodes=tuple(addresses), links=(PtyAt(),), pace=False)
         async with open_bus(everybody) as bus:
             with serial.Serial(bus.links[0].where, 38_400, timeout=30) as port:
                 answers = await asyncio.to_thread(round_of, port)
@@ -388,7 +389,7 @@ def test_the_pty_and_its_symlink_are_gone_when_the_bus_closes(tmp_path: Path) ->
     path = tmp_path / "port"
 
     async def scene() -> str:
-        async with open_bus(Configuration(pty=path)) as bus:
+        async with open_bus(Configuration(links=(PtyAt(path),))) as bus:
             assert bus.links[0].where == str(path)
             assert path.is_symlink()
             assert path.with_name("port.lock").is_file()
@@ -553,7 +554,7 @@ def test_a_link_that_cannot_be_closed_is_told_and_keeps_nothing_else_open(tmp_pa
     mothers: list[Mother] = []
 
     async def hosting() -> None:
-        async with open_bus(Configuration(pty=tmp_path / "port")) as bus:
+        async with open_bus(Configuration(links=(PtyAt(tmp_path / "port"),))) as bus:
             bus.attach(StuckLink())
             mothers.append(bus.mother())
 

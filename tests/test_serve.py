@@ -36,8 +36,9 @@ def exchange(link: str, packet: bytes, answer: bytes) -> None:
 def test_the_first_line_says_where_to_connect_and_a_client_there_moves_a_motor() -> None:
     with served("--ephemeral", "--nodes", "10-12,85", "--set", "soft_ops=true") as sacbus:
         assert sacbus.ready["event"] == "ready"
-        assert sacbus.ready["nodes"] == [10, 11, 12, 85]
-        assert sacbus.ready["baud"] == 38_400
+        (bus,) = sacbus.ready["buses"]
+        assert bus["nodes"] == [{"node": node, "kind": "sac"} for node in (10, 11, 12, 85)]
+        assert (bus["name"], bus["protocol"], bus["baud"]) == ("bus", "sac", 38_400)
         assert sacbus.ready["terminals"] == {}
         (link,) = sacbus.ready["links"]
         assert link["kind"] == "pty"
@@ -80,7 +81,7 @@ def test_without_pace_bus_time_runs_ahead_of_the_clock() -> None:
 def test_options_reach_the_bus() -> None:
     options = ("--echo", "--baud", "57600", "--receiver", "robust", "--nodes", "10")
     with served("--ephemeral", *options) as sacbus:
-        assert sacbus.ready["baud"] == 57_600
+        assert sacbus.ready["buses"][0]["baud"] == 57_600
         with serial.Serial(sacbus.link, 57_600, timeout=PATIENCE) as port:
             # Only a robust receiver hears m132, and only with echo does its sender.
             packet = encode(10, 1, b"m132")
@@ -105,7 +106,7 @@ def test_a_signal_closes_the_port_removes_symlink_and_lock_and_saves(
         assert sorted(path.name for path in (state / "bus").iterdir()) == ["10", "11", "12"]
         stopped = json.loads(sacbus.text.splitlines()[-1])
         assert stopped["event"] == "stopped"
-        assert stopped["bytes"] == len(encode(10, 1, b"m400") + ACK_10)
+        assert stopped["buses"][0]["bytes"] == len(encode(10, 1, b"m400") + ACK_10)
         assert sacbus.errors() == ""
 
 
@@ -177,7 +178,7 @@ def test_reports_are_json_lines_and_give_line_and_column() -> None:
         assert report["column"] == 1
         assert report["time_us"] > 0
         assert sacbus.send_signal(signal.SIGTERM) == 0
-        assert sacbus.read_event("stopped")["reports"] == {"refused": 1}
+        assert sacbus.read_event("stopped")["buses"][0]["reports"] == {"refused": 1}
 
 
 def test_what_was_wrong_with_the_memory_is_told_once_it_serves(tmp_path: Path) -> None:

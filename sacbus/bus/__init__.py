@@ -1,8 +1,18 @@
 """The line itself: transmissions, collisions, nodes and ports. Synchronous, in kernel time."""
 
 from sacbus.bus.bus import Bus
+from sacbus.bus.live_port import LivePort
 from sacbus.bus.medium import LaneCounters, Listener, Medium
 from sacbus.bus.port import LATENCY, Port
 from sacbus.bus.transmission import Transmission
 
-__all__ = ["LATENCY", "Bus", "LaneCounters", "Listener", "Medium", "Port", "Transmission"]
+__all__ = [
+    "LATENCY",
+    "Bus",
+    "LaneCounters",
+    "Listener",
+    "LivePort",
+    "Medium",
+    "Port",
+    "Transmission",
+]

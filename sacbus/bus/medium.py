@@ -27,7 +27,7 @@ from sacbus.bus.transmission import Transmission
 from sacbus.kernel import Kernel, LineRate, Ns
 from sacbus.node import Heard
 
-__all__ = ["LaneCounters", "Listener", "Medium", "Router"]
+__all__ = ["LaneCounters", "Listener", "Medium", "Router", "Tap"]
 
 
 class Listener(Contract):
@@ -35,6 +35,14 @@ class Listener(Contract):
 
     def hear(self, heard: Heard, now: Ns) -> None:
         """Some bytes have arrived; called in the order of their last bytes."""
+        ...
+
+
+class Tap(Contract):
+    """Whoever must know of a transmission when it begins: a line that goes on outside."""
+
+    def begun(self, sent: Transmission) -> None:
+        """``sent`` begins now. What will overlap it is not known yet."""
         ...
 
 
@@ -96,6 +104,7 @@ class Medium:
         self._sent = 0
         #: Called with each transmission when it is over; for traces and live displays.
         self.watchers: list[Callable[[Transmission], None]] = []
+        self._taps: list[tuple[object, Tap]] = []
 
     @property
     def lanes(self) -> int:
@@ -131,7 +140,17 @@ class Medium:
         place = self._lanes[lane]
         place.listeners = [entry for entry in place.listeners if entry[1] is not listener]
 
-    def transmit(self, sender: object, data: bytes, lane: int) -> Transmission:
+    def tap(self, tap: Tap, owner: object) -> None:
+        """Have ``tap`` told of what begins on any lane, but for what ``owner`` itself sends."""
+        self._taps = [*self._taps, (owner, tap)]
+
+    def untap(self, tap: Tap) -> None:
+        """Forget a tap; nothing happens if it was not there."""
+        self._taps = [entry for entry in self._taps if entry[1] is not tap]
+
+    def transmit(
+        self, sender: object, data: bytes, lane: int, ninth: bytes | None = None
+    ) -> Transmission:
         """Begin to send ``data`` (not empty) now. Nobody is kept from talking over another."""
         kernel = self.kernel
         now = kernel.now
@@ -141,7 +160,7 @@ class Medium:
         cuts = self._router.cuts(data) if lane == 0 else ()
         end = now + span
         self._sent += 1
-        sent = Transmission(self._sent, sender, lane, now, data, self.rate, end, cuts)
+        sent = Transmission(self._sent, sender, lane, now, data, self.rate, end, cuts, ninth)
         counters = place.counters
         counters.transmissions += 1
         counters.bytes += size
@@ -156,7 +175,40 @@ class Medium:
         place.active.append(sent)
         place.free_at = end
         kernel.at(now + self.rate.span(cuts[0]) if cuts else sent.end, self._arrive, sent)
+        if self._taps:
+            self._begin(sent)
         return sent
+
+    def relay(self, sender: object, data: bytes, lane: int) -> Transmission:
+        """``data`` (not empty) has come over a real line that this one goes on with.
+
+        It has taken its time there, so it has ended by now, or ends as early as what is on the lane
+        lets it: half duplex, nobody hears while talking. It collides with nothing here; what may
+        have happened to it happened on the real line.
+        """
+        kernel = self.kernel
+        now = kernel.now
+        place = self._lanes[lane]
+        span = self.rate.span(len(data))
+        start = max(now - span, 0)
+        if place.free_at is not None and place.free_at > start:
+            start = place.free_at
+        cuts = self._router.cuts(data) if lane == 0 else ()
+        self._sent += 1
+        sent = Transmission(self._sent, sender, lane, start, data, self.rate, start + span, cuts)
+        place.counters.transmissions += 1
+        place.counters.bytes += len(data)
+        place.counters.busy += span
+        place.free_at = sent.end
+        kernel.at(start + self.rate.span(cuts[0]) if cuts else sent.end, self._arrive, sent)
+        if self._taps:
+            self._begin(sent)
+        return sent
+
+    def _begin(self, sent: Transmission) -> None:
+        for owner, tap in self._taps:
+            if owner is not sent.sender:
+                tap.begun(sent)
 
     def _collide(self, place: _Lane, sent: Transmission) -> None:
         """``sent`` begins while others are on their way: what overlaps is spoilt in both."""
@@ -181,6 +233,8 @@ class Medium:
             first = sent.to_nodes
             arrived = data[first:upto] if sent.hits is None else self._spoilt(sent, first, upto)
             heard = Heard(arrived, sent.start, first, self.rate, data[upto:])
+            if sent.ninth is not None:
+                heard.ninth = sent.ninth_bits(first, upto, self._seed)
             self._router.deliver(heard, sent.sender, now)
         # Listeners hear whole frames: up to a cut that is not followed by another a byte later, and
         # at the end. (What follows the last cut of a packet is its NUL; to hear that apart would
@@ -193,6 +247,8 @@ class Medium:
                 heard = Heard(
                     self._spoilt(sent, first, upto), sent.start, first, self.rate, data[upto:]
                 )
+                if sent.ninth is not None:
+                    heard.ninth = sent.ninth_bits(first, upto, self._seed)
             sent.to_listeners = upto
             for owner, listener in place.listeners:
                 if owner is not sent.sender:

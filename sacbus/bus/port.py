@@ -24,16 +24,30 @@ LATENCY: Final[Ns] = 1 * MS
 CHUNK: Final = 4_096
 
 
+#: Bits of a byte on a line without ninth bits: start, eight, stop.
+_PLAIN_BITS: Final = 10
+
+
 class Port:
     """A talker and listener on the line.
 
     Bytes given to :meth:`talk` take line time from their arrival on, and start no earlier than
     ``latency`` after the line went idle; while the port itself is sending they follow without a
     pause. ``hear`` takes what arrives on the line; with ``echo`` the port's own bytes too, as a
-    two-wire adapter gives them back (so only on a line of one lane).
+    two-wire adapter gives them back (so only on a line of one lane). ``name`` is for people.
     """
 
-    __slots__ = ("_buffer", "_hear", "_latency", "_medium", "_until", "_waiting", "echo")
+    __slots__ = (
+        "_buffer",
+        "_hear",
+        "_latency",
+        "_medium",
+        "_ninth",
+        "_until",
+        "_waiting",
+        "echo",
+        "name",
+    )
 
     def __init__(
         self,
@@ -42,11 +56,15 @@ class Port:
         *,
         latency: Ns = LATENCY,
         echo: bool = False,
+        name: str = "port",
     ) -> None:
+        self.name = name
         self._medium = medium
         self._hear = hear
         self._latency = latency
         self._buffer = bytearray()
+        #: Their ninth bits, on a line that has some.
+        self._ninth = bytearray() if medium.rate.bits > _PLAIN_BITS else None
         #: True while an appointment to start or to go on sending stands.
         self._waiting = False
         #: When the port's own last transmission ends.
@@ -63,11 +81,13 @@ class Port:
         """The medium's side: pass on what arrived."""
         self._hear(heard, now)
 
-    def talk(self, data: bytes) -> None:
-        """Bytes from outside, arriving now."""
+    def talk(self, data: bytes, ninth: int = 0) -> None:
+        """Bytes from outside, arriving now; ``ninth`` goes with each on a line of ninth bits."""
         if not data:
             return
         self._buffer += data
+        if self._ninth is not None:
+            self._ninth += bytes((ninth,)) * len(data)
         if self._waiting:
             return
         kernel = self._medium.kernel
@@ -78,11 +98,17 @@ class Port:
         else:
             self._start()
 
+    def leave(self) -> None:
+        """Hear nothing any more; what was said is still sent, as a UART sends on what it holds."""
+        for lane in range(self._medium.lanes):
+            self._medium.unlisten(lane, self)
+
     def close(self) -> None:
         """Leave the line. What is being sent is sent to its end; the rest is dropped."""
         self._buffer.clear()
-        for lane in range(self._medium.lanes):
-            self._medium.unlisten(lane, self)
+        if self._ninth is not None:
+            self._ninth.clear()
+        self.leave()
 
     def _start(self) -> None:
         """Send what is buffered if the line lets us, or make an appointment for when it may."""
@@ -102,7 +128,11 @@ class Port:
         buffer = self._buffer
         chunk = bytes(buffer if len(buffer) <= CHUNK else buffer[:CHUNK])
         del buffer[:CHUNK]
-        self._until = medium.transmit(self, chunk, medium.master_lane).end
+        ninth = None
+        if self._ninth is not None:
+            ninth = bytes(self._ninth[: len(chunk)])
+            del self._ninth[: len(chunk)]
+        self._until = medium.transmit(self, chunk, medium.master_lane, ninth).end
         if self._buffer:
             self._waiting = True
             kernel.at(self._until, self._start)

@@ -16,7 +16,8 @@ __all__ = ["Transmission"]
 class Transmission:
     """Bytes sent in one go, without a pause, from ``start`` to ``end`` (ns) by ``sender``.
 
-    ``number`` is unique on its medium. ``data`` is what the sender sent. What arrives is
+    ``ninth`` holds a 0 or 1 for each byte where a line has ninth bits. ``number`` is unique on its
+    medium. ``data`` is what the sender sent. What arrives is
     :meth:`arrived`; the two differ where another transmission overlapped (``hits``: from-to pairs
     in ns). ``cuts`` are the offsets at which nodes hear it, ``step`` how many of them have passed,
     ``to_nodes`` and ``to_listeners`` how many bytes each have heard.
@@ -30,6 +31,7 @@ class Transmission:
         "end",
         "hits",
         "lane",
+        "ninth",
         "number",
         "rate",
         "sender",
@@ -49,6 +51,7 @@ class Transmission:
         rate: LineRate,
         end: Ns,
         cuts: Sequence[int],
+        ninth: bytes | None = None,
     ) -> None:
         self.number = number
         self.sender = sender
@@ -58,6 +61,7 @@ class Transmission:
         self.rate = rate
         self.end = end
         self.cuts = cuts
+        self.ninth = ninth
         self.step = 0
         self.to_nodes = 0
         self.to_listeners = 0
@@ -96,6 +100,18 @@ class Transmission:
                 self._wire[index] ^= crc32(b"%d %d %d" % (seed, self.number, index)) % 255 + 1
             self._settled = last
         return bytes(self._wire[first:last])
+
+    def ninth_bits(self, first: int, last: int, seed: int) -> bytes | None:
+        """The ninth bits of bytes ``first`` to ``last`` (exclusive); None where none were sent.
+
+        Those of overlapped bytes are as likely to be wrong as right.
+        """
+        if self.ninth is None or self.hits is None:
+            return self.ninth and self.ninth[first:last]
+        bits = bytearray(self.ninth[first:last])
+        for index in self._struck(self.hits, first, last):
+            bits[index - first] ^= crc32(b"%d %d %d" % (seed, self.number, index)) >> 16 & 1
+        return bytes(bits)
 
     def _struck(self, hits: list[tuple[Ns, Ns]], first: int, last: int) -> set[int]:
         """Indices in ``first``..``last`` of the bytes that a hit touches, however briefly."""

@@ -50,8 +50,9 @@ def test_a_bus_behind_a_path_answers_as_told(
         # Nothing else was on the line: 5 packets, 3 answers, and no collision.
         assert sacbus.send_signal(signal.SIGTERM) == 0
         stopped = sacbus.read_event("stopped")
-        assert (stopped["transmissions"], stopped["collided"]) == (8, 0)
-        assert stopped["reports"] == {"lost": 1}  # the packet with a wrong CRC
+        (bus,) = stopped["buses"]
+        assert (bus["transmissions"], bus["collided"]) == (8, 0)
+        assert bus["reports"] == {"lost": 1}  # the packet with a wrong CRC
 
 
 def test_what_it_sends_moves_the_motor_400_steps_and_no_other() -> None:

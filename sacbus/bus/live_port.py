@@ -1,0 +1,46 @@
+"""A live port: the place where the line goes on outside, over a real adapter.
+
+Owns nothing but the passing on, at once and both ways: bytes from there have taken their time
+already, and bytes to there take it on the real wires. That a real and a virtual talker overlap is
+seen on the real line alone; here they follow each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sacbus.bus.medium import Medium
+from sacbus.bus.transmission import Transmission
+
+__all__ = ["LivePort"]
+
+
+class LivePort:
+    """A talker and listener for what hangs on a real line.
+
+    ``send`` takes bytes the instant at which they begin on this line, so that they are on both at
+    the same time. ``name`` is for people.
+    """
+
+    __slots__ = ("_medium", "_send", "name")
+
+    def __init__(
+        self, medium: Medium, send: Callable[[bytes], None], *, name: str = "adapter"
+    ) -> None:
+        self.name = name
+        self._medium = medium
+        self._send = send
+        medium.tap(self, self)
+
+    def begun(self, sent: Transmission) -> None:
+        """The medium's side: somebody here begins to talk."""
+        self._send(sent.data)
+
+    def talk(self, data: bytes) -> None:
+        """Bytes that have come over the real line."""
+        if data:
+            self._medium.relay(self, data, self._medium.master_lane)
+
+    def close(self) -> None:
+        """Leave the line."""
+        self._medium.untap(self)

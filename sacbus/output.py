@@ -1,0 +1,281 @@
+"""What ``serve`` says while it runs, in three forms: live table, plain lines, JSON lines.
+
+Owns the words and the fields. Who says it, and when, is ``serve.py``'s business; the look of the
+table is ``live.py``'s. A leaf beside the command line.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from sacbus import __version__
+from sacbus.daemon import HostedBus
+from sacbus.kernel import MS, SECOND
+from sacbus.links import Link
+from sacbus.links.link import Server
+from sacbus.live import Screen, table
+from sacbus.node import Report
+from sacbus.writer import Writer
+
+__all__ = ["Json", "Lines", "Output", "Table", "output_for"]
+
+#: The table is drawn this often; faster than this the eye does not read numbers.
+REFRESH: Final = 0.2
+
+#: Reports that are put above the table between two drawings at most; the rest are counted.
+REPORTS_A_REFRESH: Final = 5
+
+
+class Lines:
+    """Plain lines, for a pipe, a log, or who does not want the table."""
+
+    interval: float | None = None
+
+    def __init__(self, buses: Sequence[HostedBus], lost: Callable[[OSError], None]) -> None:
+        """``lost`` is told once when nothing can be written any more."""
+        self._buses = buses
+        self._writer = Writer(lost, self.missed)
+        self.say = self._writer.say
+
+    def missed(self, count: int) -> str:
+        """What stands where ``count`` texts were not read in time."""
+        return f"… {count} lines were not read in time and are missing here\n"
+
+    def close(self) -> None:
+        """Nothing more comes."""
+        self._writer.close()
+
+    def ready(self) -> None:
+        """Everything is open: where to connect."""
+        several = len(self._buses) > 1
+        self.say(f"sacbus {__version__}" + (f": {len(self._buses)} buses\n" if several else ": "))
+        for bus in self._buses:
+            self.say((f"bus {bus.bus.name}: " if several else "") + f"{_population(bus)}\n")
+            for link in bus.links:
+                way = "on" if link.kind == "adapter" else "connect to"
+                self.say(("  " if several else "") + f"{way} {link.where}\n")
+        self.say("Ctrl-C ends it\n")
+
+    def report(self, bus: HostedBus, report: Report) -> None:
+        """A report from a bus, as it is made."""
+        self.say(f"{self._told(bus, report)}\n")
+
+    def refresh(self) -> None:
+        """Nothing to draw."""
+
+    def stopped(self) -> None:
+        """Everything is closed: what it has been."""
+        several = len(self._buses) > 1
+        for bus in self._buses:
+            counters = bus.bus.medium.counters()
+            name = f"bus {bus.bus.name}: " if several else ""
+            self.say(
+                f"{name}stopped; port closed; {counters.transmissions} transmissions, "
+                f"{counters.bytes} bytes, {counters.collided} collided\n"
+            )
+
+    def _told(self, bus: HostedBus, report: Report) -> str:
+        name = f"{bus.bus.name}: " if len(self._buses) > 1 else ""
+        return f"{report.when / SECOND:.6f} {_printable(f'{name}{report}')}"
+
+
+class Json(Lines):
+    """One JSON object a line."""
+
+    def ready(self) -> None:
+        """First of all, ``ready``; every link once for all buses, and again with its bus."""
+        self._write(
+            {
+                "event": "ready",
+                "version": __version__,
+                "links": [link for bus in self._buses for link in _links(bus)],
+                "terminals": {},
+                "buses": [
+                    {
+                        "name": bus.bus.name,
+                        "protocol": bus.bus.protocol.name,
+                        "baud": bus.bus.rate.baud,
+                        "nodes": [
+                            {"node": one.address, "kind": one.kind}
+                            for one in bus.configuration.every_node
+                        ],
+                        "links": _links(bus),
+                    }
+                    for bus in self._buses
+                ],
+            }
+        )
+
+    def report(self, bus: HostedBus, report: Report) -> None:
+        """Event ``report``."""
+        self._write(
+            {
+                "event": "report",
+                "bus": bus.bus.name,
+                "time_us": report.when / 1_000,
+                "node": report.address,
+                "what": report.kind.value,
+                "line": report.line,
+                "column": report.column,
+                "text": report.text,
+            }
+        )
+
+    def stopped(self) -> None:
+        """Last of all, ``stopped``."""
+        self._write({"event": "stopped", "buses": [_ended(bus) for bus in self._buses]})
+
+    def missed(self, count: int) -> str:
+        """As its own event."""
+        return json.dumps({"event": "missed", "lines": count}) + "\n"
+
+    def _write(self, what: dict[str, object]) -> None:
+        self.say(json.dumps(what) + "\n")
+
+
+class Table(Lines):
+    """The live table, with reports above it."""
+
+    interval: float | None = REFRESH
+
+    def __init__(self, buses: Sequence[HostedBus], lost: Callable[[OSError], None]) -> None:
+        super().__init__(buses, lost)
+        self._screen = Screen()
+        self._reports = 0
+        self._unseen = 0
+        self._loads = [_Load(bus) for bus in buses]
+
+    def report(self, bus: HostedBus, report: Report) -> None:
+        """Above the table, as many as can be read."""
+        self._reports += 1
+        if self._reports > REPORTS_A_REFRESH:
+            self._unseen += 1
+        else:
+            self.say(self._screen.above(self._told(bus, report)))
+
+    def refresh(self) -> None:
+        """Draw it again."""
+        self._reports = 0
+        if self._unseen:
+            self.say(self._screen.above(f"… and {self._unseen} more reports"))
+            self._unseen = 0
+        size = shutil.get_terminal_size()
+        columns = size.columns - 1
+        rows = max((size.lines - 6) // len(self._buses), 3)
+        lines: list[str] = []
+        for bus, load in zip(self._buses, self._loads, strict=True):
+            if bus.configuration.nodes:
+                lines += table(bus.snapshots(), columns, rows, colour=True)
+            name = f"{bus.bus.name}: " if len(self._buses) > 1 else ""
+            lines.append(f"{name}{load.line()}"[:columns])
+        self.say(self._screen.draw(lines))
+
+
+class _Load:
+    """The line's load since the last look, and its counts."""
+
+    def __init__(self, bus: HostedBus) -> None:
+        self._bus = bus
+        self._busy = 0
+        self._when = 0
+        self._load = 0.0
+
+    def line(self) -> str:
+        """As one line."""
+        counters = self._bus.bus.medium.counters()
+        now = self._bus.bus.kernel.now
+        # Short looks would jump between 0 and 100 %: average over a fifth of a second or more.
+        if now - self._when >= 150 * MS:
+            self._load = min((counters.busy - self._busy) / (now - self._when), 1)
+            self._busy, self._when = counters.busy, now
+        return (
+            f"line {self._load:.0%} busy, {counters.transmissions} transmissions, "
+            f"{counters.bytes} bytes, {counters.collided} collided"
+        )
+
+
+Output = Lines | Json | Table
+
+
+def output_for(
+    buses: Sequence[HostedBus], lost: Callable[[OSError], None], *, as_json: bool, show_table: bool
+) -> Output:
+    """The form that was asked for; a table only on a terminal."""
+    if as_json:
+        return Json(buses, lost)
+    if show_table and sys.stdout.isatty():
+        return Table(buses, lost)
+    return Lines(buses, lost)
+
+
+def _population(bus: HostedBus) -> str:
+    """``3 sac nodes (10-12) at 38400 baud``; kinds apart."""
+    by_kind: dict[str, list[int]] = {}
+    for node in bus.configuration.every_node:
+        by_kind.setdefault(node.kind, []).append(node.address)
+    kinds = [
+        f"{len(nodes)} {kind} node{'s' if len(nodes) != 1 else ''} ({_ranges(nodes)})"
+        for kind, nodes in by_kind.items()
+    ]
+    return f"{', '.join(kinds) or 'no nodes'} at {bus.bus.rate.baud} baud"
+
+
+def _links(bus: HostedBus) -> list[dict[str, object]]:
+    return [{**_link(link), "bus": bus.bus.name} for link in bus.links]
+
+
+def _link(link: Link | Server) -> dict[str, object]:
+    """What a program needs to connect: a path, or a URL with host and port."""
+    scheme, separator, rest = link.where.partition("://")
+    if not separator:
+        return {"kind": link.kind, "path": link.where}
+    host, _, port = rest.rpartition(":")
+    return {"kind": link.kind, "url": f"{scheme}://{rest}", "host": host, "port": int(port)}
+
+
+def _ended(bus: HostedBus) -> dict[str, Any]:
+    counters = bus.bus.medium.counters()
+    return {
+        "name": bus.bus.name,
+        "transmissions": counters.transmissions,
+        "bytes": counters.bytes,
+        "collided": counters.collided,
+        "reports": dict(bus.bus.report_counts),
+        "links": [
+            {
+                **_link(link),
+                **{name: getattr(link.counters, name) for name in link.counters.__slots__},
+            }
+            for link in bus.links
+        ],
+        "nodes": [
+            {
+                "node": one.address,
+                "state": one.state,
+                "position_steps": one.position_steps,
+                "position_pulses": one.position_pulses,
+                **one.counters,
+            }
+            for one in bus.snapshots()
+        ],
+    }
+
+
+def _printable(text: str) -> str:
+    """``text`` without control characters: what nodes are sent may be anything, escapes too."""
+    return "".join(one if one.isprintable() else f"\\x{ord(one):02x}" for one in text)
+
+
+def _ranges(addresses: Sequence[int]) -> str:
+    """``10-12, 85`` for (10, 11, 12, 85)."""
+    runs: list[list[int]] = []
+    for address in addresses:
+        if runs and runs[-1][1] == address - 1:
+            runs[-1][1] = address
+        else:
+            runs.append([address, address])
+    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in runs)
