@@ -229,6 +229,45 @@ def test_every_byte_is_in_one_event_or_pending(data: bytes) -> None:
     assert rest == receiver.pending
 
 
+# ---- where events stand -------------------------------------------------------------------------
+
+
+@given(streams_in_pieces())
+@example([b"\x02\x52\x01m13\x03\x00", b"\x00" + M7])
+@example([encode(1, 82, b"\x06")[:-1], b"\x00", M7])
+def test_located_events_are_those_received(chunks: list[bytes]) -> None:
+    receiver, other = PacketReceiver(), PacketReceiver()
+    for chunk in chunks:
+        located = other.locate(chunk)
+        assert [event for event, _, _ in located] == receiver.receive(chunk)
+        assert other.pending == receiver.pending
+
+
+@given(streams)
+@example(encode(1, 82, b"\x06") + M7)
+@example(encode(82, 1, b"m13") + M7)
+def test_an_event_stands_at_its_own_bytes_and_all_others_are_pending(data: bytes) -> None:
+    receiver = PacketReceiver()
+    at = 0
+    for event, begin, end in receiver.locate(data):
+        assert begin == at
+        assert data[begin:end] in forms(event)
+        at = end
+    assert data[at:] == receiver.pending
+
+
+@given(streams, st.integers(0, 300))
+def test_places_count_from_the_first_byte_given_over_all_splits(data: bytes, cut: int) -> None:
+    cut = min(cut, len(data))
+    receiver = PacketReceiver()
+    before = receiver.locate(data[:cut])
+    behind = [(event, cut + a, cut + b) for event, a, b in receiver.locate(data[cut:])]
+    whole = PacketReceiver().locate(data)
+    assert [(event, a) for event, a, _ in before + behind] == [(event, a) for event, a, _ in whole]
+    # An ending that the cut has parted from its event is all that may differ.
+    assert all(b <= c for (_, _, b), (_, _, c) in zip(before + behind, whole, strict=True))
+
+
 # ---- what is sent is heard ----------------------------------------------------------------------
 
 good_addresses = st.integers(0, 255).filter(lambda address: address not in (STX, ETX))
