@@ -31,6 +31,7 @@ __all__ = [
     "Protocol",
     "Report",
     "ReportKind",
+    "Said",
     "Setting",
     "SettingError",
     "Snapshot",
@@ -174,11 +175,46 @@ class Node(Contract):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What one of a decoder's events says, in a form that is every protocol's.
+
+    ``kind``: ``packet``, ``ack``, ``nak`` (an answer to a packet) or ``garbage``, which has no
+    ``source`` and no ``destination`` (0: everybody). ``data`` is a packet's body, or the garbage as
+    it came. ``words`` say what it means, without addresses. ``verdict`` is what the check says:
+    ``right``, ``unchecked`` (none was sent), ``wrong``, or a word of the protocol's own for what
+    else is wrong; empty where nothing is to be checked. ``size``: bytes on the wire.
+    ``reply_after``: how long after the end of a packet its answer begins, by the protocol's
+    figures, in ns; None when nobody answers it.
+    """
+
+    kind: str
+    source: int | None
+    destination: int | None
+    data: bytes
+    words: str
+    verdict: str
+    size: int
+    reply_after: Ns | None = None
+
+
 class Decoder(Contract):
-    """Bytes of a line to what they say; events are the protocol's own types."""
+    """Bytes of a line to what they say; events are the protocol's own types. Never raises."""
+
+    @property
+    def pending(self) -> bytes:
+        """The bytes that are not decided yet: a bounded number."""
+        ...
 
     def receive(self, data: bytes) -> Sequence[object]:
-        """The events that these bytes complete. Never raises."""
+        """The events that these bytes complete."""
+        ...
+
+    def locate(self, data: bytes) -> Sequence[tuple[object, int, int]]:
+        """As :meth:`receive`, each with the places of its first byte and behind its last.
+
+        Places count from the first byte of ``data``; those before it are negative.
+        """
         ...
 
 
@@ -212,8 +248,8 @@ class Protocol(Contract):
         """A new receiver for those who listen to everything."""
         ...
 
-    def describe(self, event: object) -> str:
-        """One of the decoder's events in words."""
+    def tell(self, event: object) -> Said:
+        """What one of the decoder's events says; TypeError for anything else."""
         ...
 
 

@@ -12,8 +12,19 @@ from typing import Final
 
 from sacbus.kernel import LineRate
 from sacbus.language import describe, parse
-from sacbus.node import EVERYONE
-from sacbus.wire import GENERAL_CALL, STX, Answer, Fault, LineFault, Packet, PacketReceiver, Verdict
+from sacbus.node import EVERYONE, Said
+from sacbus.wire import (
+    ETX,
+    GENERAL_CALL,
+    STX,
+    Answer,
+    Fault,
+    LineFault,
+    Packet,
+    PacketReceiver,
+    Verdict,
+)
+from sacbus.wire.times import ANSWER_BYTES, turnaround
 
 __all__ = ["SAC_PROTOCOL", "SacProtocol"]
 
@@ -26,13 +37,20 @@ _GOING_ON: Final = re.compile(rb"\x03*([^\x02\x03])?\x03*([^\x02\x03])?\x03*([^\
 #: STX may be repeated; the byte after the last one is the destination.
 _ADDRESSED: Final = re.compile(rb"\x02+([^\x02])")
 
-_FAULTS: Final = {
+_GARBAGE: Final = {
     Fault.NOISE: "noise",
     Fault.CUT_SHORT: "cut short",
-    Fault.BAD_CRC: "wrong CRC",
-    Fault.NO_NUL: "no NUL after the CRC",
     Fault.TOO_LONG: "too long",
 }
+#: A frame that is whole but for its end: devices answer it, so it is told as the packet that it is.
+_FLAWED: Final = {Fault.BAD_CRC: "wrong", Fault.NO_NUL: "no NUL"}
+_VERDICTS: Final = {
+    Verdict.RIGHT: "right",
+    Verdict.UNCHECKED: "unchecked",
+    Verdict.WRONG: "wrong",
+}
+#: STX, destination, source, ETX, CRC, NUL.
+_FRAMING: Final = 6
 
 
 class SacProtocol:
@@ -77,18 +95,30 @@ class SacProtocol:
         """The robust receiver."""
         return PacketReceiver()
 
-    def describe(self, event: object) -> str:
-        """A packet, an answer or a fault in words, without its time."""
+    def tell(self, event: object) -> Said:
+        """A packet, an answer or a fault; a frame with a wrong CRC is a packet too.
+
+        ``size`` of a packet without CRC is without the NUL that may follow.
+        """
         match event:
             case Packet(dest, src, body, verdict):
-                unchecked = "" if verdict is Verdict.RIGHT else " (no CRC)"
-                return f"{src} -> {dest or 'all'}: {describe(parse(body))}{unchecked}"
+                framing = _FRAMING if verdict is not Verdict.UNCHECKED else _FRAMING - 1
+                return _packet(dest, src, body, _VERDICTS[verdict], len(body) + framing)
             case Answer(dest, src, accepted):
-                return f"{src} -> {dest}: {'ACK' if accepted else 'NAK'}"
+                word = "ACK" if accepted else "NAK"
+                return Said(word.lower(), src, dest, b"", word, "", ANSWER_BYTES)
+            case LineFault(kind, data) if kind in _FLAWED:
+                body = data[3 : data.index(ETX, 3)]
+                return _packet(data[1], data[2], body, _FLAWED[kind], len(data))
             case LineFault(kind, data):
-                return f"{_FAULTS[kind]}: {data.hex(' ')}"
+                return Said("garbage", None, None, data, _GARBAGE[kind], "", len(data))
             case _:
                 raise TypeError(f"not an event of the SAC decoder: {event!r}")
+
+
+def _packet(dest: int, src: int, body: bytes, verdict: str, size: int) -> Said:
+    answered = None if dest == GENERAL_CALL else turnaround(len(body), nul_follows=True)
+    return Said("packet", src, dest, body, describe(parse(body)), verdict, size, answered)
 
 
 def _cuts_going_on(data: bytes) -> list[int]:

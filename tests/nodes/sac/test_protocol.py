@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from nodes.sac.protocol import SAC_PROTOCOL
-from sacbus.node import EVERYONE
+from sacbus.node import EVERYONE, Said
 from sacbus.wire import (
     Answer,
     DeviceReceiver,
@@ -116,37 +116,69 @@ def test_its_decoder_is_the_robust_receiver() -> None:
 
 
 @pytest.mark.parametrize(
-    ("event", "words"),
+    ("event", "said"),
     [
-        (Answer(1, NODE, accepted=True), "82 -> 1: ACK"),
-        (Answer(1, NODE, accepted=False), "82 -> 1: NAK"),
-        (LineFault(Fault.NOISE, b"\x41\x00"), "noise: 41 00"),
-        (LineFault(Fault.CUT_SHORT, b"\x02"), "cut short: 02"),
-        (LineFault(Fault.BAD_CRC, b"\x02"), "wrong CRC: 02"),
-        (LineFault(Fault.NO_NUL, b"\x02"), "no NUL after the CRC: 02"),
-        (LineFault(Fault.TOO_LONG, b"\x02"), "too long: 02"),
+        (Answer(1, NODE, accepted=True), Said("ack", NODE, 1, b"", "ACK", "", 4)),
+        (Answer(1, NODE, accepted=False), Said("nak", NODE, 1, b"", "NAK", "", 4)),
+        (
+            LineFault(Fault.NOISE, b"\x41\x00"),
+            Said("garbage", None, None, b"\x41\x00", "noise", "", 2),
+        ),
+        (
+            LineFault(Fault.CUT_SHORT, b"\x02"),
+            Said("garbage", None, None, b"\x02", "cut short", "", 1),
+        ),
+        (
+            LineFault(Fault.TOO_LONG, b"\x02\x02"),
+            Said("garbage", None, None, b"\x02\x02", "too long", "", 2),
+        ),
     ],
 )
-def test_events_are_described_in_words(event: object, words: str) -> None:
-    assert SAC_PROTOCOL.describe(event) == words
+def test_answers_and_garbage_are_told(event: object, said: Said) -> None:
+    assert SAC_PROTOCOL.tell(event) == said
 
 
-def test_packets_are_described_by_who_says_what_to_whom() -> None:
-    (event,) = SAC_PROTOCOL.decoder().receive(PACKET)
-    described = SAC_PROTOCOL.describe(event)
-    assert described.startswith("1 -> 82: ")
-    assert "200" in described
-    to_all = SAC_PROTOCOL.describe(Packet(0, 1, b"S", Verdict.UNCHECKED))
-    assert to_all.startswith("1 -> all: ")
-    assert to_all.endswith(" (no CRC)")
+@pytest.mark.parametrize(
+    ("data", "verdict", "size"),
+    [
+        (PACKET, "right", 10),
+        (encode(NODE, 1, b"m200", crc=False), "unchecked", 9),
+        (PACKET[:-2] + b"\x99\x00", "wrong", 10),
+        # Whatever is not the NUL ends the frame, and belongs to what comes next.
+        (PACKET[:-2] + b"\x99" + PACKET, "wrong", 9),
+        (PACKET[:-1] + PACKET, "no NUL", 9),
+    ],
+)
+def test_a_packet_is_told_with_what_its_check_says(data: bytes, verdict: str, size: int) -> None:
+    event = SAC_PROTOCOL.decoder().receive(data)[0]
+    assert SAC_PROTOCOL.tell(event) == Said(
+        "packet", 1, NODE, b"m200", "move 200 full steps", verdict, size, 385_000
+    )
+
+
+def test_a_long_packet_is_answered_later_and_a_general_call_never() -> None:
+    long = SAC_PROTOCOL.tell(Packet(NODE, 1, b"V100 as before", Verdict.RIGHT))
+    assert long.reply_after == 385_000 + 9 * 13_000
+    to_all = SAC_PROTOCOL.tell(Packet(0, 1, b"S", Verdict.UNCHECKED))
+    assert (to_all.destination, to_all.reply_after) == (0, None)
+
+
+def test_the_devices_own_receiver_calls_a_packet_wrong_as_well() -> None:
+    assert SAC_PROTOCOL.tell(Packet(NODE, 1, b"S", Verdict.WRONG)).verdict == "wrong"
 
 
 def test_what_is_no_event_of_this_network_is_a_mistake() -> None:
     with pytest.raises(TypeError, match="not an event of the SAC decoder: 'ACK'"):
-        SAC_PROTOCOL.describe("ACK")
+        SAC_PROTOCOL.tell("ACK")
 
 
-@given(st.binary(max_size=100))
-def test_whatever_the_decoder_gives_can_be_described(data: bytes) -> None:
-    for event in SAC_PROTOCOL.decoder().receive(data + nak(1, NODE)):
-        assert SAC_PROTOCOL.describe(event)
+@given(bursts)
+@example(b"\x02\x52\x01m1235\x03\x0c")
+def test_whatever_the_decoder_gives_can_be_told_and_has_its_size(data: bytes) -> None:
+    for event, begin, end in SAC_PROTOCOL.decoder().locate(data + nak(1, NODE)):
+        said = SAC_PROTOCOL.tell(event)
+        assert said.kind in {"packet", "ack", "nak", "garbage"}
+        assert said.words
+        assert (said.source is None) == (said.destination is None) == (said.kind == "garbage")
+        # A peer may send an answer with an ending, and leave out the NUL behind a CRC of 00.
+        assert said.size - 1 <= end - begin <= said.size + 3
