@@ -162,7 +162,11 @@ class HostedBus:
             self.host.arrive(port.talk, tuning.from_client(data))
 
         link.open(deliver)
-        port = Port(self.bus.medium, hear, latency=latency, echo=echo, name=link.where)
+
+        def hold(held: bool) -> None:
+            link.hold(held=held)
+
+        port = Port(self.bus.medium, hear, latency=latency, echo=echo, name=link.where, hold=hold)
         self._ports.append(port)
         return port
 

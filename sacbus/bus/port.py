@@ -24,6 +24,11 @@ LATENCY: Final[Ns] = 1 * MS
 CHUNK: Final = 4_096
 
 
+#: Bytes that wait for the line, beyond which whoever says them is asked to hold back, and down to
+#: which they are before it may go on. A system's own buffers before a UART are of this order.
+FULL: Final = 16_384
+LOW: Final = 4_096
+
 #: Bits of a byte on a line without ninth bits: start, eight, stop.
 _PLAIN_BITS: Final = 10
 
@@ -34,12 +39,16 @@ class Port:
     Bytes given to :meth:`talk` take line time from their arrival on, and start no earlier than
     ``latency`` after the line went idle; while the port itself is sending they follow without a
     pause. ``hear`` takes what arrives on the line; with ``echo`` the port's own bytes too, as a
-    two-wire adapter gives them back (so only on a line of one lane). ``name`` is for people.
+    two-wire adapter gives them back (so only on a line of one lane). ``hold`` is told True when so
+    many bytes wait for the line that no more should come, and False when they may again. ``name``
+    is for people.
     """
 
     __slots__ = (
         "_buffer",
         "_hear",
+        "_held",
+        "_hold",
         "_latency",
         "_medium",
         "_ninth",
@@ -57,8 +66,11 @@ class Port:
         latency: Ns = LATENCY,
         echo: bool = False,
         name: str = "port",
+        hold: Callable[[bool], None] | None = None,
     ) -> None:
         self.name = name
+        self._hold = hold
+        self._held = False
         self._medium = medium
         self._hear = hear
         self._latency = latency
@@ -88,6 +100,8 @@ class Port:
         self._buffer += data
         if self._ninth is not None:
             self._ninth += bytes((ninth,)) * len(data)
+        if len(self._buffer) > FULL:
+            self._flow(held=True)
         if self._waiting:
             return
         kernel = self._medium.kernel
@@ -128,6 +142,8 @@ class Port:
         buffer = self._buffer
         chunk = bytes(buffer if len(buffer) <= CHUNK else buffer[:CHUNK])
         del buffer[:CHUNK]
+        if self._held and len(buffer) <= LOW:
+            self._flow(held=False)
         ninth = None
         if self._ninth is not None:
             ninth = bytes(self._ninth[: len(chunk)])
@@ -136,3 +152,8 @@ class Port:
         if self._buffer:
             self._waiting = True
             kernel.at(self._until, self._start)
+
+    def _flow(self, *, held: bool) -> None:
+        if held != self._held and self._hold is not None:
+            self._held = held
+            self._hold(held)

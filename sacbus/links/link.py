@@ -57,6 +57,13 @@ class Link(Protocol):
         What an absent or slow reader misses is dropped and counted, as on a serial line.
         """
 
+    def hold(self, *, held: bool) -> None:
+        """Take no more bytes from the client, which then waits as at a full UART; or go on.
+
+        A little that is on its way already may still be delivered. Held or not is forgotten when
+        the link is closed.
+        """
+
     def client_baud(self) -> int | None:
         """The rate the client has set, in bits a second; None where a link has no such thing."""
 

@@ -26,6 +26,7 @@ class _Wire:
     where: str
     counters: LinkCounters = field(default_factory=LinkCounters)
     deliver: Callable[[bytes], None] | None = None
+    held: bool = False
     client: MemoryClient | None = None
     unread: bytearray = field(default_factory=bytearray)
 
@@ -46,14 +47,20 @@ class MemoryClient:
         self.hear: Final = hear
         self._wire = wire
 
-    def write(self, data: bytes) -> None:
-        """Put bytes on the bus. Raises LinkError when either end has been closed."""
+    def write(self, data: bytes) -> int:
+        """Put bytes on the bus, all or, while the link is held, none; how many that was.
+
+        Raises LinkError when either end has been closed.
+        """
         wire = self._wire
         if wire.client is not self or wire.deliver is None:
             raise LinkError("the line is closed", wire.where, "open it again")
+        if wire.held:
+            return 0
         if data:
             wire.counters.bytes_in += len(data)
             wire.deliver(bytes(data))
+        return len(data)
 
     def read(self, size: int | None = None) -> bytes:
         """What came, `size` bytes of it at the most; b"" when nothing waits or an end is closed."""
@@ -106,6 +113,9 @@ class MemoryLink:
         self.counters.bytes_out += taken
         self.counters.dropped_out += len(data) - taken
 
+    def hold(self, *, held: bool) -> None:
+        self._wire.held = held
+
     def client_baud(self) -> int:
         """The rate the client has set; the bus's own when nobody is there."""
         return self._baud if self._wire.client is None else self._wire.client.baud
@@ -113,6 +123,7 @@ class MemoryLink:
     def close(self) -> None:
         """End the link, for a client too: it has nothing left to read and cannot write any more."""
         self._wire.deliver = None
+        self._wire.held = False
         self._wire.hang_up()
 
     def client(

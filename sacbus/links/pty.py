@@ -63,6 +63,7 @@ class PtyLink:
         self._present = False
         self._opens = 0  # clients that have it open, as far as hints can tell
         self._sent = False  # whether the present clients may have something unread
+        self._held = False
 
     @property
     def where(self) -> str:
@@ -97,6 +98,17 @@ class PtyLink:
         self.counters.bytes_out += taken
         self.counters.dropped_out += len(data) - taken
 
+    def hold(self, *, held: bool) -> None:
+        """As Link.hold. A client that leaves meanwhile is noticed when the link goes on."""
+        if held == self._held or self._pair is None:
+            return
+        self._held = held
+        if self._present and self._loop is not None:
+            if held:
+                self._loop.remove_reader(self._pair.master)
+            else:
+                self._loop.add_reader(self._pair.master, self._readable)
+
     def client_baud(self) -> int:
         """The rate the client has set; the bus's own before and after. Costs 1 µs."""
         return self._baud if self._pair is None else self._pair.baud()
@@ -105,6 +117,7 @@ class PtyLink:
         if self._pair is None:
             return
         pair, self._pair, self._deliver = self._pair, None, None
+        self._held = False
         if self._present and self._sent:
             with contextlib.suppress(OSError):  # exclusive to a client: lost uncounted
                 self.counters.dropped_out += pair.drain()
@@ -141,7 +154,8 @@ class PtyLink:
     def _arrived(self, pair: PtyPair) -> None:
         self._present, self._sent = True, False
         assert self._loop is not None  # open has found it
-        self._loop.add_reader(pair.master, self._readable)
+        if not self._held:
+            self._loop.add_reader(pair.master, self._readable)
 
     def _gone(self, pair: PtyPair) -> None:
         if self._present and self._loop is not None:

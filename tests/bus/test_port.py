@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from sacbus.bus import LATENCY, Bus, Port, Transmission
-from sacbus.kernel import MS, SECOND, US, Kernel, Ns
+from sacbus.kernel import MS, SECOND, US, Kernel, LineRate, Ns
 from sacbus.node import Heard
 from tests.nodes.sac.bench import NODE, Bench, packet
 
@@ -172,3 +172,99 @@ def test_ports_on_lines_without_nodes_need_nothing_else() -> None:
     one.talk(b"\x02A")
     kernel.run()
     assert heard == [b"\x02A"]
+
+
+def test_who_leaves_hears_no_more_but_what_it_had_said_is_sent_to_the_end() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    desk.port.talk(packet("v100"))
+    desk.port.talk(packet("v200"))
+    desk.port.leave()
+    bench.run()
+    assert [sent.data for sent in desk.sent] == [packet("v100"), packet("v200")]
+    assert desk.heard == []
+
+
+NINE_BITS = LineRate(9_600, bits=11)
+
+
+class NinthBits:
+    """A listener that keeps what it hears with the ninth bits."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[bytes, bytes | None]] = []
+
+    def hear(self, heard: Heard, now: Ns) -> None:
+        self.heard.append((heard.data, heard.ninth))
+
+
+def test_ninth_bits_arrive_with_their_bytes() -> None:
+    bus = Bus(Kernel(), Bench().bus.protocol, rate=NINE_BITS)
+    port, ear = Port(bus.medium, lambda _heard, _now: None), NinthBits()
+    bus.medium.listen(0, ear, None)
+    port.talk(b"\x51", 1)
+    port.talk(b"\x01\x02\x04")
+    bus.kernel.run()
+    assert ear.heard == [(b"\x51", b"\x01"), (b"\x01\x02\x04", b"\x00\x00\x00")]
+    assert bus.kernel.now == NINE_BITS.span(1) + NINE_BITS.span(3)
+    port.talk(b"\x51", 1)
+    port.talk(b"\x52", 1)
+    port.close()
+    port.talk(b"\x53")
+    bus.kernel.run()
+    assert ear.heard[2:] == [(b"\x51", b"\x01"), (b"\x53", b"\x00")]
+
+
+def test_ninth_bits_of_a_long_run_stay_with_their_bytes() -> None:
+    bus = Bus(Kernel(), Bench().bus.protocol, rate=NINE_BITS)
+    port, ear = Port(bus.medium, lambda _heard, _now: None), NinthBits()
+    bus.medium.listen(0, ear, None)
+    port.talk(b"A")
+    port.talk(b"B" * 5_000, 1)
+    port.talk(b"C" * 5_000)
+    bus.kernel.run()
+    data = b"".join(data for data, _ in ear.heard)
+    ninth = b"".join(bits or b"" for _, bits in ear.heard)
+    assert data == b"A" + b"B" * 5_000 + b"C" * 5_000
+    assert ninth == b"\x00" + b"\x01" * 5_000 + b"\x00" * 5_000
+
+
+def test_the_ninth_bits_of_overlapped_bytes_may_be_wrong_and_those_of_others_never() -> None:
+    bus = Bus(Kernel(), Bench().bus.protocol, rate=NINE_BITS, seed=3)
+    ear = NinthBits()
+    bus.medium.listen(0, ear, None)
+    bus.medium.transmit("one", b"A" * 40, 0, b"\x01" * 40)
+    bus.kernel.at(NINE_BITS.span(20), bus.medium.transmit, "two", b"B" * 40, 0, b"\x01" * 40)
+    bus.kernel.run()
+    first = b"".join(bits or b"" for _, bits in ear.heard[:-1])[:40]
+    assert first[:20] == b"\x01" * 20
+    assert set(first[20:]) == {0, 1}
+
+
+def test_on_a_line_without_ninth_bits_nobody_hears_any() -> None:
+    bus = Bus(Kernel(), Bench().bus.protocol)
+    port, ear = Port(bus.medium, lambda _heard, _now: None), NinthBits()
+    bus.medium.listen(0, ear, None)
+    port.talk(b"\x51", 1)
+    bus.kernel.run()
+    assert ear.heard == [(b"\x51", None)]
+
+
+def test_who_says_more_than_the_line_can_take_is_asked_to_hold_back_until_there_is_room() -> None:
+    bench = Bench()
+    asked: list[bool] = []
+    unsent: list[int] = []
+
+    def hold(held: bool) -> None:
+        asked.append(held)
+        unsent.append(port.unsent)
+
+    port = Port(bench.bus.medium, lambda _heard, _now: None, hold=hold)
+    for _ in range(10):
+        port.talk(b"U" * 4_000)
+    assert asked == [True]
+    bench.run()
+    assert asked == [True, False]
+    assert 16_384 < unsent[0] <= 16_384 + 4_000
+    assert 0 < unsent[1] <= 4_096
+    assert bench.bus.medium.counters().bytes == 40_000
