@@ -83,13 +83,14 @@ class Sacbus:
 
 
 @contextmanager
-def started(*arguments: str) -> Iterator[Sacbus]:
+def started(*arguments: str, **environment: str) -> Iterator[Sacbus]:
     """``python -m sacbus ARGUMENTS``; killed at the end if it still runs."""
     process = subprocess.Popen(
         [sys.executable, "-m", "sacbus", *arguments],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
+        env={**os.environ, **environment},
     )
     assert process.stdout is not None
     with process:
@@ -100,9 +101,9 @@ def started(*arguments: str) -> Iterator[Sacbus]:
 
 
 @contextmanager
-def served(*arguments: str) -> Iterator[Sacbus]:
+def served(*arguments: str, **environment: str) -> Iterator[Sacbus]:
     """``sacbus serve --json ARGUMENTS`` that has said that it is ready."""
-    with started("serve", "--json", *arguments) as sacbus:
+    with started("serve", "--json", *arguments, **environment) as sacbus:
         sacbus.ready = sacbus.read_event("ready")
         yield sacbus
 
