@@ -6,7 +6,8 @@ host says so.
 
 - *Real* (:class:`RealHost`): bus time follows the loop's clock, times ``speed``, against one
   absolute anchor, so that a late wake-up delays one event and never shifts those that follow. It is
-  as precise as the loop it runs on. With ``ahead`` the line does not wait for the clock.
+  as precise as the loop it runs on (``selector.py`` makes precise ones), and measures how late it
+  runs its events. With ``line_free_at`` the line does not wait for the clock.
 - *Virtual* (:class:`VirtualLoop`): an event loop whose clock *is* the kernel's. When nothing else
   is ready it jumps to the next event or timer. The same run every time, as fast as it computes.
 """
@@ -17,12 +18,14 @@ import asyncio
 import selectors
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Executor
+from math import inf
 from typing import Any, Final, TypeVar, TypeVarTuple
 from typing import Protocol as Contract
 
 from sacbus.kernel import MS, SECOND, Kernel, Ns
+from sacbus.lateness import Lateness
 
-__all__ = ["Host", "RealHost", "Standstill", "VirtualHost", "VirtualLoop", "run_virtual"]
+__all__ = ["BEHIND", "Host", "RealHost", "Standstill", "VirtualHost", "VirtualLoop", "run_virtual"]
 
 _T = TypeVar("_T")
 _Ts = TypeVarTuple("_Ts")
@@ -31,11 +34,20 @@ _Ts = TypeVarTuple("_Ts")
 #: turnaround (0.92 ms) and link latency (1 ms), so that no answer waits for the clock.
 _QUIET: Final[Ns] = 2 * MS
 
+#: Later than this, ns of wall time, an event is worth a word: no scheduler that has nothing better
+#: to do is, and programs that time each other on the line begin to notice.
+BEHIND: Final[Ns] = 10 * MS
+
+#: Seconds from one word about lateness to the next.
+_SPARE: Final = 1.0
+
 
 class Host(Contract):
     """What links and the daemon need of a host."""
 
     kernel: Kernel
+    #: How late events ran, in wall time; empty where they cannot be late.
+    lateness: Lateness
 
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
         """Something came in from the world: bring bus time up to date, then take it in."""
@@ -52,6 +64,9 @@ class RealHost:
     ``speed`` scales: 10 lets ten bus seconds pass in one. ``line_free_at``, when given, says when
     the line was last, or will be, free: then bus time runs ahead of the clock while the line is in
     use (``serve --no-pace``), and by as much motion is ahead too; otherwise it keeps the clock's.
+
+    ``lateness`` tells how long after its time by the clock each event ran, in ns of wall time
+    whatever the speed; events of one instant count once, and those that ran ahead not at all.
     """
 
     def __init__(
@@ -65,6 +80,12 @@ class RealHost:
         if not speed > 0:
             raise ValueError(f"speed: expected more than 0, got {speed}")
         self.kernel = kernel
+        self.lateness = Lateness()
+        #: Called with the worst lateness since the last call, in ns of wall time, when an event ran
+        #: more than :data:`BEHIND` late; once a second at most.
+        self.late_watcher: Callable[[Ns], object] | None = None
+        self._untold: Ns = 0
+        self._spared_until = -inf
         self._loop = loop
         self._speed = speed
         self._line_free_at = line_free_at
@@ -107,13 +128,38 @@ class RealHost:
         """Run what is due, call back, run what follows; arm the timer whatever comes out of it."""
         self._busy = True
         try:
-            self.kernel.run_until(self.bus_now())
+            self._catch_up()
             callback(*arguments)
             if self._line_free_at is not None:
                 self._run_ahead(self._line_free_at)
         finally:
             self._busy = False
             self._arm()
+
+    def _catch_up(self) -> None:
+        """Run what is due by now, and note how late it is."""
+        kernel = self.kernel
+        limit = self.bus_now()
+        worst = 0
+        # The limit stays, so that whatever the events cost, the loop gets its turn.
+        while (when := kernel.next_at()) is not None and when <= limit:
+            # Asked anew: one event may have held up the next.
+            late = int((self.bus_now() - when) / self._speed)
+            self.lateness.note(late)
+            if late > worst:
+                worst = late
+            kernel.run_until(when)
+        kernel.run_until(limit)
+        if worst > BEHIND:
+            self._tell_of(worst)
+
+    def _tell_of(self, late: Ns) -> None:
+        self._untold = max(self._untold, late)
+        now = self._loop.time()
+        if self.late_watcher is not None and now >= self._spared_until:
+            self._spared_until = now + _SPARE
+            told, self._untold = self._untold, 0
+            self.late_watcher(told)
 
     def _run_ahead(self, line_free_at: Callable[[], Ns | None]) -> None:
         """Run the line's events without waiting, and move the anchor by what that gained."""
@@ -207,6 +253,7 @@ class VirtualHost:
 
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
+        self.lateness = Lateness()
 
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
         """Bus time is up to date already."""

@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from sacbus.host import RealHost, Standstill, VirtualHost, VirtualLoop, run_virtual
+from sacbus.host import BEHIND, RealHost, Standstill, VirtualHost, VirtualLoop, run_virtual
 from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from tests.nodes.sac.bench import NODE, Bench, Said, packet
 
@@ -151,6 +151,136 @@ def test_after_close_nothing_runs_and_closing_again_is_no_mistake() -> None:
     assert ran == []
 
 
+# ---- lateness -----------------------------------------------------------------------------------
+
+
+def test_how_late_events_ran_is_measured_one_by_one() -> None:
+    wall, kernel = Kernel(), Kernel()
+    lateness: list[int] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        for when in (10 * MS, 20 * MS, 90 * MS):
+            kernel.at(when, lambda: None)
+        host = RealHost(kernel, loop)
+        wall.run_until(50 * MS)  # as if the process had been away
+        await asyncio.sleep(1)
+        host.close()
+        lateness.extend((host.lateness.count, host.lateness.worst, host.lateness.p50))
+
+    beside(wall, main)
+    count, worst, half = lateness
+    assert count == 3
+    assert nearly(worst, 40 * MS)
+    assert half == pytest.approx(30 * MS, rel=0.04)
+
+
+def test_an_event_that_takes_long_makes_the_next_one_late() -> None:
+    wall, kernel = Kernel(), Kernel()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at(10 * MS, lambda: wall.run_until(wall.now + 7 * MS))
+        kernel.at(10 * MS + 1, lambda: None)
+        host = RealHost(kernel, loop)
+        # Both are due when something comes in, before the timer of the first has fired.
+        wall.run_until(10 * MS + 1)
+        host.arrive(lambda: None)
+        assert host.lateness.count == 2
+        assert nearly(host.lateness.worst, 7 * MS)
+        host.close()
+
+    beside(wall, main)
+
+
+def test_events_of_one_instant_count_once() -> None:
+    kernel = Kernel()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        for _ in range(10):
+            kernel.at(10 * MS, lambda: None)
+        host = RealHost(kernel, loop)
+        await asyncio.sleep(1)
+        host.close()
+        assert host.lateness.count == 1
+        assert host.lateness.worst < US
+
+    beside(Kernel(), main)
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
+def test_lateness_is_wall_time_whatever_the_speed(speed: float) -> None:
+    wall, kernel = Kernel(), Kernel()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at(round(10 * MS * speed), lambda: None)
+        host = RealHost(kernel, loop, speed=speed)
+        wall.run_until(15 * MS)
+        await asyncio.sleep(1)
+        host.close()
+        assert nearly(host.lateness.worst, 5 * MS)
+
+    beside(wall, main)
+
+
+def test_what_runs_ahead_is_not_late() -> None:
+    bench = Bench()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(bench.kernel, loop, line_free_at=lambda: bench.bus.medium.free_at(0))
+        for _ in range(10):
+            host.arrive(bench.port.talk, packet("v100"))
+            await asyncio.sleep(0.1)
+        assert len(bench.heard) == 10
+        assert host.lateness.count == 0
+        host.close()
+
+    beside(Kernel(), main)
+
+
+def test_a_machine_that_cannot_keep_up_is_told_of_with_the_worst_but_once_a_second() -> None:
+    wall, kernel = Kernel(), Kernel()
+    told: list[tuple[float, Ns]] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(kernel, loop)
+        host.late_watcher = lambda late: told.append((round(loop.time(), 2), late // MS))
+        for when, late in (
+            (1_000, BEHIND // MS),
+            (2_000, 20),
+            (2_400, 50),
+            (2_600, 30),
+            (3_050, 11),
+            (3_500, 40),
+            (5_000, 12),
+        ):
+            for moment in (when, when + 1):  # the worst of what is late together counts
+                host.arrive(kernel.at, moment * MS, lambda: None)
+            await asyncio.sleep(when / 1_000 - loop.time() - 0.001)
+            wall.run_until((when + late) * MS)  # as if the process had been away
+        await asyncio.sleep(1)
+        host.close()
+        assert host.lateness.count == 14
+
+    beside(wall, main)
+    assert told == [(2.02, 20), (3.06, 50), (5.01, 40)]
+
+
+def test_with_nobody_to_tell_a_machine_that_cannot_keep_up_goes_on() -> None:
+    wall, kernel = Kernel(), Kernel()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at(10 * MS, lambda: None)
+        loop.set_exception_handler(lambda _loop, context: failed.append(context))
+        host = RealHost(kernel, loop)
+        wall.run_until(SECOND)
+        await asyncio.sleep(1)
+        assert host.lateness.worst >= 990 * MS
+        host.close()
+
+    failed: list[object] = []
+    beside(wall, main)
+    assert failed == []
+
+
 # ---- running ahead ------------------------------------------------------------------------------
 
 
@@ -264,6 +394,7 @@ def test_what_arrives_at_a_virtual_host_is_taken_in_at_once() -> None:
     host.close()
     host.close()
     assert seen == [5]
+    assert host.lateness.count == 0
 
 
 def test_a_virtual_run_is_the_same_every_time() -> None:
