@@ -100,7 +100,8 @@ class Medium:
         self.rate = rate
         self._router = router
         self._lanes = [_Lane() for _ in range(lanes)]
-        self._seed = seed
+        #: What fixes how overlapped bytes arrive (:meth:`Transmission.arrived`).
+        self.seed = seed
         self._sent = 0
         #: Called with each transmission when it is over; for traces and live displays.
         self.watchers: list[Callable[[Transmission], None]] = []
@@ -234,7 +235,7 @@ class Medium:
             arrived = data[first:upto] if sent.hits is None else self._spoilt(sent, first, upto)
             heard = Heard(arrived, sent.start, first, self.rate, data[upto:])
             if sent.ninth is not None:
-                heard.ninth = sent.ninth_bits(first, upto, self._seed)
+                heard.ninth = sent.ninth_bits(first, upto, self.seed)
             self._router.deliver(heard, sent.sender, now)
         # Listeners hear whole frames: up to a cut that is not followed by another a byte later, and
         # at the end. (What follows the last cut of a packet is its NUL; to hear that apart would
@@ -248,7 +249,7 @@ class Medium:
                     self._spoilt(sent, first, upto), sent.start, first, self.rate, data[upto:]
                 )
                 if sent.ninth is not None:
-                    heard.ninth = sent.ninth_bits(first, upto, self._seed)
+                    heard.ninth = sent.ninth_bits(first, upto, self.seed)
             sent.to_listeners = upto
             for owner, listener in place.listeners:
                 if owner is not sent.sender:
@@ -265,7 +266,7 @@ class Medium:
             self.kernel.at(sent.end, self._arrive, sent)
 
     def _spoilt(self, sent: Transmission, first: int, last: int) -> bytes:
-        return sent.arrived(first, last, self._seed)
+        return sent.arrived(first, last, self.seed)
 
     def _rest_matters(self, place: _Lane, sent: Transmission, upto: int) -> bool:
         """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""
