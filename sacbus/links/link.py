@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
-__all__ = ["Link", "LinkCounters", "Server"]
+__all__ = ["FormattedLink", "Link", "LinkCounters", "SerialFormat", "Server"]
 
 
 @dataclass(slots=True)
@@ -25,9 +25,33 @@ class LinkCounters:
     clients: int = 0
     """Times a client opened the other end; several in the same instant may count once."""
     framing_errors: int = 0
-    """Bytes that came in without a stop bit, where the system counts them (a real port on Linux)."""
+    """Bytes that came in without a stop bit, where the system counts them: a real port of Linux."""
     reconnects: int = 0
     """Times the other end was lost and found again: an adapter that was unplugged."""
+
+    def add(self, more: LinkCounters) -> None:
+        """Count what another link has counted as well, as a server does of its programs."""
+        self.bytes_in += more.bytes_in
+        self.bytes_out += more.bytes_out
+        self.dropped_out += more.dropped_out
+        self.clients += more.clients
+        self.framing_errors += more.framing_errors
+        self.reconnects += more.reconnects
+
+
+@dataclass(frozen=True, slots=True)
+class SerialFormat:
+    """What a program wants a byte to look like on its serial line; as text ``8N1``."""
+
+    data_bits: int = 8
+    """5 to 8."""
+    parity: str = "N"
+    """N none, E even, O odd, M mark (always 1), S space (always 0)."""
+    stop_bits: float = 1
+    """1, 1.5 or 2."""
+
+    def __str__(self) -> str:
+        return f"{self.data_bits}{self.parity}{self.stop_bits:g}"
 
 
 class Link(Protocol):
@@ -69,6 +93,17 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Let everybody go; leaves no descriptor and no file. May be called again."""
+
+
+@runtime_checkable
+class FormattedLink(Link, Protocol):
+    """A link that also knows how its client has set the bits of a byte.
+
+    Few do: a pty keeps 8N whatever a program asks for, and TCP has no such thing.
+    """
+
+    def client_format(self) -> SerialFormat:
+        """What the client has set; called often, so it must cost next to nothing."""
 
 
 class Server(Protocol):

@@ -1,7 +1,8 @@
-"""A client at another baud rate than the line's: what becomes of the bytes between the two.
+"""A client whose serial settings are not the line's: what becomes of the bytes between the two.
 
 Owns the one way in which a link touches bytes. A pty would pass on any byte at any setting; a wire
-does not, and a program that sets the wrong rate must find out here and not on the machine.
+does not, and a program that sets the wrong rate, data bits or parity must find out here and not on
+the machine. On a line with ninth bits parity is how a program sets them: mark is 1, space is 0.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final
 
-from .link import Link
+from .link import FormattedLink, Link, SerialFormat
 
 __all__ = ["Tuning"]
 
@@ -23,22 +24,58 @@ TOLERANCE: Final = 2.5
 #: do without.
 TRUST: Final = 8
 
+#: Bits of a byte on a line without ninth bits (start, eight, stop), and on one with them.
+PLAIN_BITS: Final = 10
+NINE_BITS: Final = 11
+
+#: Parities that a line understands: of 8N1 only none, since the parity bit comes where the stop bit
+#: should be; where a ninth bit is, those that give it one value, and none (a second stop bit).
+_PARITIES: Final = {PLAIN_BITS: "N", NINE_BITS: "NMS"}
+
+_NINTH: Final = {"M": 1, "S": 0}
+
 
 class Tuning:
     """Between a link and a line of ``baud``: passes bytes on as they are, or spoilt.
 
-    At another rate every byte arrives as another value, drawn from ``noise``; ``tell`` is given a
-    sentence each time the client's rate turns out to be a new wrong one.
+    ``bits`` are those of a byte on the line: 10 or, with ninth bits, 11. At another rate, other
+    data bits or another parity every byte arrives as another value, drawn from ``noise``; ``tell``
+    is given a sentence each time the client's setting turns out to be a new wrong one. Stop bits
+    spoil nothing: a second one is a pause.
     """
 
-    __slots__ = ("_baud", "_link", "_noise", "_right", "_tell", "_told", "_trust", "spoilt")
+    __slots__ = (
+        "_baud",
+        "_format",
+        "_link",
+        "_nine",
+        "_noise",
+        "_parities",
+        "_right",
+        "_tell",
+        "_told",
+        "_trust",
+        "spoilt",
+    )
 
-    def __init__(self, link: Link, baud: int, noise: Random, tell: Callable[[str], object]) -> None:
+    def __init__(
+        self,
+        link: Link,
+        baud: int,
+        noise: Random,
+        tell: Callable[[str], object],
+        *,
+        bits: int = PLAIN_BITS,
+    ) -> None:
         self._link = link
         self._baud = baud
+        self._nine = bits == NINE_BITS
+        self._parities = _PARITIES[bits]
+        #: What tells the client's format; None for a link that has no such thing.
+        self._format = link.client_format if isinstance(link, FormattedLink) else None
         self._noise = noise
         self._tell = tell
-        self._told: int | None = None
+        self._told: int | SerialFormat | None = None
         self._right = True
         #: How often what the client's last bytes showed is taken to hold for bytes to it.
         self._trust = 0
@@ -59,16 +96,35 @@ class Tuning:
             self._look()
         return data if self._right else self._spoil(data)
 
+    def ninth(self) -> int | None:
+        """The ninth bit that the client's parity puts on its bytes just now: mark 1, space 0.
+
+        None when it puts none there, and on a line that has no ninth bits.
+        """
+        if self._format is None or not self._nine:
+            return None
+        return _NINTH.get(self._format().parity)
+
     def _look(self) -> None:
         rate = self._link.client_baud()
         self._right = rate is None or abs(rate - self._baud) * 100 <= TOLERANCE * self._baud
-        if self._right:
+        if not self._right:
+            self._complain(rate, f"{rate} baud", f"runs at {self._baud}")
+        elif self._format is not None and not self._fits(form := self._format()):
+            self._right = False
+            self._complain(form, str(form), f"is 8N1{' with a ninth bit' * self._nine}")
+        else:
             self._told = None
-        elif rate != self._told:
-            self._told = rate
+
+    def _fits(self, form: SerialFormat) -> bool:
+        return form.data_bits == 8 and form.parity in self._parities
+
+    def _complain(self, wrong: int | SerialFormat | None, has: str, line: str) -> None:
+        if wrong != self._told:
+            self._told = wrong
             self._tell(
-                f"the program on {self._link.where} has set {rate} baud, the line runs at "
-                f"{self._baud}: bytes arrive garbled"
+                f"the program on {self._link.where} has set {has}, the line {line}: "
+                "bytes arrive garbled"
             )
 
     def _spoil(self, data: bytes) -> bytes:
