@@ -394,6 +394,37 @@ def kinds(as_json: bool) -> int:
     return 0
 
 
+@root.command("check")
+@click.argument("configs", nargs=-1, required=True, metavar="CONFIG.toml...")
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+@_verbose
+def check_command(configs: tuple[str, ...], as_json: bool) -> int:
+    """Say all that is wrong with configurations, or what they would host. Opens nothing.
+
+    Mistakes are errors, status 2; what is only odd, here and now, is a warning. A CONFIG of - is
+    standard input.
+
+    \b
+    Example: sacbus check workshop.toml
+    """
+    from sacbus.check import as_json as in_json
+    from sacbus.check import as_text
+    from sacbus.config import examine
+
+    found = [examine(config) for config in configs]
+    if as_json:
+        click.echo(json.dumps(in_json(found)))
+    for one in found:
+        if not as_json:
+            for line in as_text(one):
+                click.echo(line)
+        for warning in one.warnings:
+            click.echo(f"warning: {warning}", err=True)
+        for mistake in one.mistakes:
+            click.echo(f"error: {mistake}", err=True)
+    return USAGE_STATUS if any(one.mistakes for one in found) else 0
+
+
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """The entry point ``sacbus``: runs a command and exits with its status."""
     sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
@@ -418,6 +449,8 @@ def run(arguments: list[str]) -> int:
         named = f", {fault.filename}" if fault.filename is not None else ""
         return _failed(f"{fault.strerror}{named}" if fault.strerror else str(fault), 1, verbose)
     except Exception as fault:
+        if (mistakes := _mistakes(fault)) is not None:
+            return _failed("\nerror: ".join(mistakes), USAGE_STATUS, verbose)
         if not _is_for_users(fault):
             raise
         return _failed(str(fault.args[0]) if fault.args else str(fault), 1, verbose)
@@ -431,6 +464,13 @@ def _is_for_users(fault: Exception) -> bool:
     from sacbus.node import KindError, SettingError
 
     return isinstance(fault, MotherError | KindError | SettingError)
+
+
+def _mistakes(fault: Exception) -> list[str] | None:
+    """The lines about a configuration that is wrong; None for other faults."""
+    from sacbus.config.mistake import ConfigError
+
+    return [str(one) for one in fault.mistakes] if isinstance(fault, ConfigError) else None
 
 
 def _usage(fault: click.ClickException) -> str:
