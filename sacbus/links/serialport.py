@@ -1,0 +1,254 @@
+"""A serial port on the event loop: pyserial-asyncio, whose defects and pyserial's end in this file.
+
+Owns opening a port by its path, in words when that fails, and telling its end once. What is wrong
+with the two (0.6 and 3.5) and is put right here:
+
+- an unplugged port with something still to write ends in a traceback from the loop; one that is
+  unplugged while nothing is read of it is told only afterwards (what is left, in 0.6 on Linux, of
+  its issues 12 and 28: that an unplugged port is never told);
+- what another program takes between pyserial's `select` and its `read` leaves an empty read, and
+  that counts as unplugged: with VMIN 0, as pyserial sets it, nothing and the end look the same;
+- `select` itself fails above descriptor 1023, and then again at every turn of the loop;
+- a write that the system does not take at once is tried again and again in the loop, without pause;
+- closing waits in the loop until everything is written (`tcdrain`), for ever on a port that is
+  stuck, and the system waits once more, up to 30 s;
+- aborting what is ending already ends it twice, the second time with an AttributeError;
+- what waits to be written is kept without limit;
+- opening may raise `termios.error`, which is no OSError, and hands out what is not yet connected.
+
+On Windows, where pyserial has other calls and pyserial-asyncio polls every half millisecond, only
+the last four are put right.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Callable
+from typing import Final
+
+import serial
+import serial_asyncio
+
+from .errors import LinkError
+
+if sys.platform != "win32":
+    import termios
+
+__all__ = ["BOUND", "SerialConnection"]
+
+#: Bytes that wait for a port which does not take them: what the system has no room for. 17 s of a
+#: line at 38400 baud.
+BOUND: Final = 65_536
+
+_CHUNK: Final = 65_536  # the most one read may bring; Linux gives 4 kB at a time
+
+_CHECK: Final = "check the path, and whether the bus is running"
+_WAIT: Final = "wait until the other program has closed it"
+_REASONS: Final = {
+    errno.ENOENT: ("no such file", _CHECK),
+    errno.ENXIO: ("no such device", "plug it in, or check the path"),
+    errno.ENODEV: ("no such device", "plug it in, or check the path"),
+    errno.EISDIR: ("it is a directory", _CHECK),
+    errno.ENOTTY: ("it is not a serial port", _CHECK),
+    errno.EACCES: ("permission denied", "join the group that owns it, often dialout"),
+    errno.EBUSY: ("another program has it", _WAIT),
+    errno.EWOULDBLOCK: ("another program has it", _WAIT),
+    errno.EIO: ("nobody is at its other end", _CHECK),
+}
+_HUNG_UP: Final = "unplugged, or closed by its other end"
+
+
+class _Port(serial.Serial):
+    """pyserial's port, which fails by calling ``failed`` instead of raising, and never waits."""
+
+    failed: Callable[[str], object]
+
+    if sys.platform != "win32":
+
+        def read(self, size: int = 1) -> bytes:  # noqa: ARG002 (pyserial-asyncio's is too small)
+            """What has come; b"" when there is nothing, or nothing will come any more."""
+            try:
+                data = os.read(self.fileno(), _CHUNK)
+            except (BlockingIOError, InterruptedError):
+                return b""
+            except OSError as fault:
+                self.failed(_words(fault))
+                return b""
+            if not data:
+                self.failed(_HUNG_UP)
+            return data
+
+        def write(self, data: bytes, /) -> int:  # type: ignore[override]  # bytes is all we write
+            """How many bytes the system took; all, if it takes none any more."""
+            try:
+                return os.write(self.fileno(), data)
+            except (BlockingIOError, InterruptedError):
+                return 0
+            except OSError as fault:
+                self.failed(_words(fault))
+                return len(data)
+
+        def flush(self) -> None:
+            """Not wait: pyserial-asyncio calls this in the loop, before it closes."""
+
+        def close(self) -> None:
+            """Close, throwing away what the system has not sent: it would wait for that."""
+            if self.is_open:
+                with contextlib.suppress(termios.error):
+                    termios.tcflush(self.fileno(), termios.TCOFLUSH)
+            super().close()
+
+
+class SerialConnection(asyncio.Protocol):
+    """An open port, 8N1, raw, for oneself alone, until it is closed or lost.
+
+    ``hear`` gets what comes, ``lose`` why the port is gone: once, and not after :meth:`close`.
+    ``rts`` is the level that RTS has from the start. Raises LinkError when the port cannot be had.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        baud: int,
+        hear: Callable[[bytes], None],
+        lose: Callable[[str], None],
+        *,
+        rts: bool = True,
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._hear = hear
+        self._lose = lose
+        self._failing = False
+        self._ended = False
+        #: Bytes that the port had not taken when it was lost.
+        self.lost_unwritten = 0
+        self.port: Final = _Port()
+        self.port.failed = self._failed
+        try:
+            _open(self.port, path, baud, rts=rts)
+        except _FAULTS as fault:
+            why, remedy = _reason(fault)
+            raise LinkError(f"cannot open the line ({why})", path, remedy) from fault
+        self._transport = serial_asyncio.SerialTransport(self._loop, self, self.port)
+
+    @property
+    def unsent(self) -> int:
+        """Bytes that wait here or in the system, as far as that tells; 0 once the port is gone."""
+        if self._ended:
+            return 0
+        with contextlib.suppress(OSError):
+            return self._unwritten + self.port.out_waiting
+        return self._unwritten
+
+    def send(self, data: bytes) -> int:
+        """Write without waiting; how many bytes were taken. What BOUND leaves no room for is not.
+
+        Bytes given to a port that is gone count as taken only as long as that is not known.
+        """
+        if self._ended or self._failing or self._transport.is_closing():
+            return 0
+        taken = 0
+        if sys.platform != "win32" and not self._unwritten:
+            # At once, not at the loop's next turn: that is a third of what a reply costs.
+            taken = self.port.write(data)
+        rest = data[taken : taken + BOUND - self._unwritten]
+        if rest:
+            self._transport.write(rest)
+        return taken + len(rest)
+
+    def hold(self, *, held: bool) -> None:
+        """Read no more, or go on. A port that is unplugged meanwhile is noticed afterwards."""
+        # Behind the transport's own beginning to read, which waits for the loop's next turn.
+        self._loop.call_soon(self._hold, held)
+
+    def close(self) -> int:
+        """Close at once, leaving no descriptor; how many bytes had not been written. Idempotent."""
+        if self._ended:
+            return 0
+        self._ended = True
+        unwritten = self._unwritten
+        # First, since closing a transport that has something to write only asks for its end.
+        self._transport.flush()
+        if not self._transport.is_closing():
+            self._transport.abort()
+        self.port.close()
+        return unwritten
+
+    def data_received(self, data: bytes) -> None:
+        """asyncio's: bytes have come."""
+        if not self._ended:
+            self._hear(data)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """asyncio's: the transport has ended; by our own doing, but for Windows."""
+        self._end(_HUNG_UP if exc is None else _words(exc))
+
+    @property
+    def _unwritten(self) -> int:
+        size = self._transport.get_write_buffer_size()
+        assert isinstance(size, int)
+        return size
+
+    def _hold(self, held: bool) -> None:
+        if not self._ended and held:
+            self._transport.pause_reading()
+        elif not self._ended:
+            self._transport.resume_reading()
+
+    def _failed(self, why: str) -> None:
+        """The port's: it is gone. Told at the loop's next turn, since the transport is busy now."""
+        if not self._failing:
+            self._failing = True
+            self._loop.call_soon(self._end, why)
+
+    def _end(self, why: str) -> None:
+        if not self._ended:
+            self.lost_unwritten = self.close()
+            self._lose(why)
+
+
+def _open(port: _Port, path: str, baud: int, *, rts: bool) -> None:
+    port.port = path
+    port.baudrate = baud
+    port.exclusive = True
+    port.rts = rts
+    if sys.platform != "win32":
+        port.inter_byte_timeout = 0  # what pyserial makes VMIN 1 of
+    port.open()
+
+
+def _words(fault: BaseException) -> str:
+    """The system's reason in words, without numbers and paths."""
+    number = _number(fault)
+    if number == errno.EIO:
+        return _HUNG_UP
+    return os.strerror(number).lower() if number is not None else str(fault)
+
+
+def _reason(fault: BaseException) -> tuple[str, str]:
+    """Why a port cannot be opened, and what to do; pyserial puts the system's error into a text."""
+    cause: BaseException | None = fault
+    while cause is not None:
+        number = _number(cause)
+        if number in _REASONS:
+            return _REASONS[number]
+        cause = cause.__context__
+    return getattr(fault, "strerror", None) or str(fault), "check the path and the rate"
+
+
+def _number(fault: BaseException) -> int | None:
+    """The system's error number; ``termios.error`` has it as its first argument only."""
+    number = getattr(fault, "errno", None)
+    if number is None and sys.platform != "win32" and isinstance(fault, termios.error):
+        number = fault.args[0]
+    return number if isinstance(number, int) else None
+
+
+#: What pyserial raises when it opens: SerialException is an OSError, a rate that cannot be set is a
+#: ValueError, or NotImplementedError where the system knows only the usual ones.
+_USUAL: Final = (OSError, ValueError, NotImplementedError)
+_FAULTS: Final = _USUAL if sys.platform == "win32" else (*_USUAL, termios.error)
