@@ -1,63 +1,47 @@
-"""The two ends of every kind of link, under one name, for the suite that all of them must pass."""
+"""The two ends of every kind of link, under one name, for the suite that all of them must pass.
+
+A new kind of link is entered in one place: ``BACKENDS``, at the end.
+"""
 
 from __future__ import annotations
 
 import asyncio
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Protocol
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Final, Literal
 
-from sacbus.links import Link, MemoryLink, Presence, PtyLink
+import pytest
 
+from sacbus.links import Link, LinkCounters, MemoryLink, Presence, PtyLink
+from sacbus.links.link import Server
+from sacbus.links.rfc2217 import Rfc2217Server
+from sacbus.links.tcp import TcpServer
+from tests.links.programs import Client, MemoryProgram, PtyProgram, TcpProgram, TelnetProgram
 
-class Client(Protocol):
-    """A program that has the other end open; neither call ever waits."""
+__all__ = [
+    "BACKENDS",
+    "Backend",
+    "Client",
+    "Ear",
+    "LinkRig",
+    "NoPresence",
+    "PtyProgram",
+    "Rig",
+    "ServerRig",
+    "able_to",
+    "rig_of",
+    "until",
+]
 
-    def write(self, data: bytes) -> int:
-        """Write what the line takes; how many bytes that was."""
-
-    def read(self) -> bytes: ...
-
-    def close(self) -> None: ...
-
-
-class MemoryProgram:
-    def __init__(self, link: MemoryLink) -> None:
-        self._client = link.client()
-
-    def write(self, data: bytes) -> int:
-        self._client.write(data)
-        return len(data)
-
-    def read(self) -> bytes:
-        return self._client.read()
-
-    def close(self) -> None:
-        self._client.close()
-
-
-class PtyProgram:
-    """Bare system calls: it sets nothing, flushes nothing, and so sees what the link left."""
-
-    def __init__(self, path: str | Path) -> None:
-        self.descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-
-    def write(self, data: bytes) -> int:
-        try:
-            return os.write(self.descriptor, data)
-        except BlockingIOError:
-            return 0
-
-    def read(self) -> bytes:
-        try:
-            return os.read(self.descriptor, 65_536)
-        except BlockingIOError:
-            return b""
-
-    def close(self) -> None:
-        os.close(self.descriptor)
+Capability = Literal[
+    "stands alone",  # there is a link while no program has the other end open
+    "tells absence",  # it knows when nobody is there, and then keeps nothing for whoever comes
+    "counts unread",  # it knows what a program that left had not read, and counts it as dropped
+    "has rate",  # a program can set its rate, and finds the bus's
+    "serves many",  # each program gets a link of its own
+]
 
 
 class NoPresence(Presence):
@@ -67,43 +51,65 @@ class NoPresence(Presence):
         return None
 
 
-class Rig:
-    """An open link, what it delivered, and programs that open its other end."""
+class Rig(ABC):
+    """The bus's end of a link, what it delivered, and programs that open the other end.
 
-    def __init__(self, link: Link) -> None:
-        self.link = link
+    ``program`` opens that end, given what a user would open.
+    """
+
+    def __init__(self, program: Callable[[str], Client], *, tells_absence: bool = True) -> None:
+        self._program = program
+        self.tells_absence = tells_absence
         self.heard = bytearray()
+        #: Where the bus's side hears what programs say.
+        self.deliver: Callable[[bytes], object] = self.heard.extend
         self._programs: list[Client] = []
 
     @property
-    def tells_absence(self) -> bool:
-        """Without inotify a pty cannot know that nobody is there."""
-        return not (isinstance(self.link, PtyLink) and isinstance(self.link._presence, NoPresence))
+    @abstractmethod
+    def link(self) -> Link:
+        """The link of the program that came last."""
 
-    def open(self) -> None:
-        self.link.open(self.heard.extend)
+    @property
+    @abstractmethod
+    def counters(self) -> LinkCounters:
+        """Of all programs so far."""
+
+    @property
+    @abstractmethod
+    def where(self) -> str:
+        """What a program opens."""
+
+    @abstractmethod
+    async def start(self) -> None:
+        """Let programs in."""
+
+    @abstractmethod
+    def shut(self) -> None:
+        """Close the bus's end."""
 
     def client(self) -> Client:
-        program: Client
-        if isinstance(self.link, MemoryLink):
-            program = MemoryProgram(self.link)
-        else:
-            program = PtyProgram(self.link.where)
+        """A program that has the other end open."""
+        program = self._program(self.where)
         self._programs.append(program)
         return program
 
     async def client_is_known(self) -> Client:
         """A client that the link has noticed, so that what is sent from now on is for it."""
-        known = self.link.counters.clients
+        known = self.counters.clients
         client = self.client()
         if self.tells_absence:
-            await until(lambda: self.link.counters.clients > known)
+            await until(lambda: self.counters.clients > known)
         return client
+
+    def forget(self, client: Client) -> None:
+        """Close a client, and do not wait for anything."""
+        self._programs.remove(client)
+        client.close()
 
     async def leave(self, client: Client) -> None:
         """Close a client, and wait until the link drops what is sent to it."""
-        self._programs.remove(client)
-        client.close()
+        self.forget(client)
         if self.tells_absence:
             await until(lambda: not self._takes_a_byte())
 
@@ -112,27 +118,136 @@ class Rig:
         self.link.send(b"?")
         return self.link.counters.bytes_out > before
 
+    def hear(self, data: bytes) -> None:
+        """The bus's side: bytes have come."""
+        self.deliver(data)
+
     def close(self) -> None:
-        self.link.close()
+        self.shut()
         while self._programs:
             self._programs.pop().close()
 
 
-BACKENDS = ("memory", "pty", "pty without inotify")
-BACKENDS_THAT_TELL_ABSENCE = ("memory", "pty")
+class LinkRig(Rig):
+    """A link for one program at a time, by default one that opens a serial port by its path."""
+
+    def __init__(
+        self,
+        link: Link,
+        program: Callable[[str], Client] = PtyProgram,
+        *,
+        tells_absence: bool = True,
+    ) -> None:
+        super().__init__(program, tells_absence=tells_absence)
+        self._link = link
+
+    @property
+    def link(self) -> Link:
+        return self._link
+
+    @property
+    def counters(self) -> LinkCounters:
+        return self._link.counters
+
+    @property
+    def where(self) -> str:
+        return self._link.where
+
+    def open(self) -> None:
+        self._link.open(self.hear)
+
+    async def start(self) -> None:
+        self.open()
+
+    def shut(self) -> None:
+        self._link.close()
 
 
-@contextmanager
-def rig_of(backend: str) -> Iterator[Rig]:
-    """An open rig; needs a running loop."""
-    made: dict[str, Callable[[], Link]] = {
-        "memory": MemoryLink,
-        "pty": PtyLink,
-        "pty without inotify": lambda: PtyLink(presence=NoPresence()),
-    }
-    rig = Rig(made[backend]())
-    rig.open()
+class ServerRig(Rig):
+    """A server, and the links of the programs that have come, in that order."""
+
+    def __init__(self, server: Server, program: Callable[[str], Client]) -> None:
+        super().__init__(program)
+        self.server = server
+        self.links: list[Link] = []
+        #: Those whose leaving has been told.
+        self.gone: list[Link] = []
+
+    @property
+    def link(self) -> Link:
+        return self.links[-1]
+
+    @property
+    def counters(self) -> LinkCounters:
+        return self.server.counters
+
+    @property
+    def where(self) -> str:
+        return self.server.where
+
+    async def start(self) -> None:
+        await self.server.open(self.admit)
+
+    def admit(self, link: Link) -> Callable[[], None]:
+        self.links.append(link)
+        link.open(self.hear)
+        return lambda: self.gone.append(link)
+
+    def shut(self) -> None:
+        self.server.close()
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """A kind of link as the suite meets it: how it is set up, and what not all kinds can do."""
+
+    rig: Callable[[], Rig]
+    can: frozenset[Capability]
+
+
+def backend(rig: Callable[[], Rig], *can: Capability) -> Backend:
+    return Backend(rig, frozenset(can))
+
+
+def _memory() -> Rig:
+    link = MemoryLink()
+    return LinkRig(link, lambda _where: MemoryProgram(link))
+
+
+def _pty_without_inotify() -> Rig:
+    return LinkRig(PtyLink(presence=NoPresence()), tells_absence=False)
+
+
+#: Every kind of link there is. The suite runs on all of them, and on those that can do what a test
+#: is about where not all can.
+BACKENDS: Final[dict[str, Backend]] = {
+    "memory": backend(_memory, "stands alone", "tells absence", "counts unread", "has rate"),
+    "pty": backend(
+        lambda: LinkRig(PtyLink()), "stands alone", "tells absence", "counts unread", "has rate"
+    ),
+    "pty without inotify": backend(_pty_without_inotify, "stands alone", "has rate"),
+    "tcp": backend(lambda: ServerRig(TcpServer(), TcpProgram), "tells absence", "serves many"),
+    "rfc2217": backend(
+        lambda: ServerRig(Rfc2217Server(), TelnetProgram),
+        "tells absence",
+        "has rate",
+        "serves many",
+    ),
+}
+
+
+def able_to(*needed: Capability) -> pytest.MarkDecorator:
+    """Run a test on those kinds of link alone that can do all of that."""
+    able = [name for name, backend in BACKENDS.items() if backend.can.issuperset(needed)]
+    return pytest.mark.parametrize("rig", able, indirect=True)
+
+
+@asynccontextmanager
+async def rig_of(name: str) -> AsyncIterator[Rig]:
+    """The rig of a backend, open."""
+    rig = BACKENDS[name].rig()
     try:
+        await rig.start()
         yield rig
     finally:
         rig.close()

@@ -20,7 +20,7 @@ import pytest_asyncio
 import serial
 
 from sacbus.links import LinkError, Presence, PtyLink
-from tests.links.rig import Ear, NoPresence, PtyProgram, Rig, until
+from tests.links.rig import Ear, LinkRig, NoPresence, PtyProgram, until
 
 pytestmark = pytest.mark.asyncio
 
@@ -28,8 +28,8 @@ NOBODY = 65_534
 
 
 @pytest_asyncio.fixture
-async def rig(tmp_path: Path) -> AsyncIterator[Rig]:
-    rig = Rig(PtyLink(tmp_path / "port"))
+async def rig(tmp_path: Path) -> AsyncIterator[LinkRig]:
+    rig = LinkRig(PtyLink(tmp_path / "port"))
     rig.open()
     yield rig
     rig.close()
@@ -50,14 +50,14 @@ def unprivileged(tmp_path: Path) -> Iterator[None]:
     os.seteuid(0)
 
 
-def absent(rig: Rig) -> bool:
+def absent(rig: LinkRig) -> bool:
     """Whether the link drops what it is told to send, since nobody is there."""
     before = rig.link.counters.bytes_out
     rig.link.send(b"?")
     return rig.link.counters.bytes_out == before
 
 
-async def test_the_symlink_is_where_and_leads_to_the_line(rig: Rig, tmp_path: Path) -> None:
+async def test_the_symlink_is_where_and_leads_to_the_line(rig: LinkRig, tmp_path: Path) -> None:
     assert rig.link.where == str(tmp_path / "port")
     assert str(Path(rig.link.where).readlink()).startswith("/dev/")
     rig.close()
@@ -73,7 +73,7 @@ async def test_without_a_symlink_where_is_the_device_once_it_is_there() -> None:
     assert link.where == ""
 
 
-async def test_a_path_that_is_taken_leaves_no_pty_behind(rig: Rig) -> None:
+async def test_a_path_that_is_taken_leaves_no_pty_behind(rig: LinkRig) -> None:
     # The descriptors are counted after every test.
     second = PtyLink(rig.link.where)
     with pytest.raises(LinkError, match=f"served by process {os.getpid()}"):
@@ -97,7 +97,7 @@ async def test_a_system_without_a_pty_to_give_is_told_in_one_line() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-async def test_a_program_that_sets_nothing_finds_the_line_raw(rig: Rig) -> None:
+async def test_a_program_that_sets_nothing_finds_the_line_raw(rig: LinkRig) -> None:
     client = await rig.client_is_known()
     ear = Ear(client)
     tricky = b"\x03\x04\x0d\x0a\x11\x13\x1a\x7f\x00\xff\n"
@@ -109,7 +109,7 @@ async def test_a_program_that_sets_nothing_finds_the_line_raw(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("rate", [9600, 57_600, 250_000])
-async def test_pyserial_talks_and_its_rate_is_seen(rig: Rig, rate: int) -> None:
+async def test_pyserial_talks_and_its_rate_is_seen(rig: LinkRig, rate: int) -> None:
     with serial.Serial(rig.link.where, rate, timeout=0) as port:
         await until(lambda: rig.link.client_baud() == rate)
         port.write(b"to the bus")
@@ -121,7 +121,7 @@ async def test_pyserial_talks_and_its_rate_is_seen(rig: Rig, rate: int) -> None:
     assert rig.link.client_baud() == 38_400
 
 
-async def test_pyserial_may_hold_the_port_for_itself(rig: Rig) -> None:
+async def test_pyserial_may_hold_the_port_for_itself(rig: LinkRig) -> None:
     with serial.Serial(rig.link.where, timeout=0, exclusive=True) as port:
         port.write(b"mine")
         await until(lambda: rig.heard == b"mine")
@@ -129,13 +129,13 @@ async def test_pyserial_may_hold_the_port_for_itself(rig: Rig) -> None:
             serial.Serial(rig.link.where, exclusive=True)
 
 
-async def test_the_modem_lines_that_a_pty_lacks_are_refused_by_the_system(rig: Rig) -> None:
+async def test_the_modem_lines_that_a_pty_lacks_are_refused_by_the_system(rig: LinkRig) -> None:
     with serial.Serial(rig.link.where) as port, pytest.raises(OSError, match="Inappropriate ioctl"):
         port.rts = True
 
 
 @pytest.mark.skipif(shutil.which("socat") is None, reason="socat is not installed")
-async def test_socat_talks(rig: Rig) -> None:
+async def test_socat_talks(rig: LinkRig) -> None:
     known = rig.link.counters.clients
     socat = await asyncio.create_subprocess_exec(
         "socat",
@@ -156,7 +156,7 @@ async def test_socat_talks(rig: Rig) -> None:
     await until(lambda: absent(rig))
 
 
-async def test_a_shell_may_write_a_packet_and_leave_at_once(rig: Rig) -> None:
+async def test_a_shell_may_write_a_packet_and_leave_at_once(rig: LinkRig) -> None:
     for _ in range(20):
         rig.heard.clear()
         with Path(rig.link.where).open("wb", buffering=0) as port:
@@ -165,7 +165,7 @@ async def test_a_shell_may_write_a_packet_and_leave_at_once(rig: Rig) -> None:
     await until(lambda: absent(rig))
 
 
-async def test_a_killed_program_has_left(rig: Rig) -> None:
+async def test_a_killed_program_has_left(rig: LinkRig) -> None:
     hold = (
         "import os, sys; os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print(); sys.stdin.read()"
     )
@@ -181,7 +181,7 @@ async def test_a_killed_program_has_left(rig: Rig) -> None:
     assert rig.link.counters.dropped_out >= 6
 
 
-async def test_two_programs_share_the_line_until_the_last_has_left(rig: Rig) -> None:
+async def test_two_programs_share_the_line_until_the_last_has_left(rig: LinkRig) -> None:
     first = await rig.client_is_known()
     second = await rig.client_is_known()
     first.write(b"one ")
@@ -196,7 +196,9 @@ async def test_two_programs_share_the_line_until_the_last_has_left(rig: Rig) -> 
     await rig.leave(second)
 
 
-async def test_programs_that_come_and_go_in_the_same_instant_are_not_miscounted(rig: Rig) -> None:
+async def test_programs_that_come_and_go_in_the_same_instant_are_not_miscounted(
+    rig: LinkRig,
+) -> None:
     # The kernel tells three opens in a row as one event, and two closes as well.
     programs = [rig.client() for _ in range(3)]
     programs[2].write(b"one")
@@ -212,7 +214,7 @@ async def test_programs_that_come_and_go_in_the_same_instant_are_not_miscounted(
     await rig.leave(programs[2])
 
 
-async def test_the_next_program_finds_nothing_stale_however_quick_it_is(rig: Rig) -> None:
+async def test_the_next_program_finds_nothing_stale_however_quick_it_is(rig: LinkRig) -> None:
     # The line is never hung up between them: one closes and one opens while the loop is busy.
     client = await rig.client_is_known()
     for turn in range(1, 10):
@@ -230,7 +232,7 @@ async def test_the_next_program_finds_nothing_stale_however_quick_it_is(rig: Rig
         assert rig.link.counters.clients == 1 + turn
 
 
-async def test_an_answer_given_at_once_is_not_thrown_away_with_what_is_stale(rig: Rig) -> None:
+async def test_an_answer_given_at_once_is_not_thrown_away_with_what_is_stale(rig: LinkRig) -> None:
     # All of this is there when the loop looks, the former program's last byte the first of it.
     rig.link.close()
     rig.link.open(lambda data: rig.link.send(b"answer") if data.endswith(b"?") else None)
@@ -287,7 +289,7 @@ async def test_a_program_that_comes_while_another_leaves_is_heard() -> None:
 
 
 @pytest.mark.slow
-async def test_no_program_is_missed_in_the_moment_when_another_leaves(rig: Rig) -> None:
+async def test_no_program_is_missed_in_the_moment_when_another_leaves(rig: LinkRig) -> None:
     # It hangs, and the test with it, as soon as one answer is lost.
     ask = """
 import os, sys
@@ -310,14 +312,14 @@ for turn in range(2000):
     assert rig.link.counters.bytes_in == 2000
 
 
-async def test_what_is_unread_when_the_link_closes_is_counted(rig: Rig) -> None:
+async def test_what_is_unread_when_the_link_closes_is_counted(rig: LinkRig) -> None:
     await rig.client_is_known()
     rig.link.send(b"unread")
     rig.link.close()
     assert rig.link.counters.dropped_out == 6
 
 
-async def test_what_a_program_did_to_the_line_is_undone_when_it_leaves(rig: Rig) -> None:
+async def test_what_a_program_did_to_the_line_is_undone_when_it_leaves(rig: LinkRig) -> None:
     client = PtyProgram(rig.link.where)
     attributes = termios.tcgetattr(client.descriptor)
     attributes[0] = termios.ICRNL | termios.IXON
@@ -342,7 +344,7 @@ async def test_what_a_program_did_to_the_line_is_undone_when_it_leaves(rig: Rig)
 async def test_a_line_left_exclusive_by_a_killed_program_is_open_to_the_next(
     tmp_path: Path, unprivileged: None
 ) -> None:
-    rig = Rig(PtyLink(tmp_path / "port"))
+    rig = LinkRig(PtyLink(tmp_path / "port"))
     rig.open()
     for _ in range(3):
         client = PtyProgram(rig.link.where)
@@ -362,7 +364,7 @@ async def test_a_line_left_exclusive_by_a_killed_program_is_open_to_the_next(
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root, whom an exclusive line does not stop")
 async def test_a_line_left_exclusive_is_open_to_all_again_when_the_bus_runs_as_root(
-    rig: Rig,
+    rig: LinkRig,
 ) -> None:
     client = PtyProgram(rig.link.where)
     await until(lambda: not absent(rig))
@@ -380,7 +382,7 @@ async def test_a_line_left_exclusive_is_open_to_all_again_when_the_bus_runs_as_r
 
 async def test_links_may_share_what_tells_presence(tmp_path: Path) -> None:
     presence = Presence()
-    rigs = [Rig(PtyLink(tmp_path / str(number), presence=presence)) for number in range(3)]
+    rigs = [LinkRig(PtyLink(tmp_path / str(number), presence=presence)) for number in range(3)]
     for rig in rigs:
         rig.open()
     ears = [Ear(await rig.client_is_known()) for rig in rigs]
@@ -396,7 +398,7 @@ async def test_links_may_share_what_tells_presence(tmp_path: Path) -> None:
 
 
 async def test_without_inotify_what_nobody_reads_fills_a_buffer_and_is_then_dropped() -> None:
-    rig = Rig(PtyLink(presence=NoPresence()))
+    rig = LinkRig(PtyLink(presence=NoPresence()))
     rig.open()
     for _ in range(100):
         rig.link.send(bytes(1024))
@@ -409,7 +411,7 @@ async def test_without_inotify_what_nobody_reads_fills_a_buffer_and_is_then_drop
     rig.close()
 
 
-async def test_the_loop_sleeps_while_nobody_is_there(rig: Rig) -> None:
+async def test_the_loop_sleeps_while_nobody_is_there(rig: LinkRig) -> None:
     # A master that nobody has open is ready to be read for ever; a loop that watched it would spin.
     loop = asyncio.get_running_loop()
     assert isinstance(loop, asyncio.SelectorEventLoop)
