@@ -206,6 +206,11 @@ class Decoder(Contract):
         """The bytes that are not decided yet: a bounded number."""
         ...
 
+    @property
+    def unfinished(self) -> bool:
+        """Whether what is pending may yet become a packet; noise never does."""
+        ...
+
     def receive(self, data: bytes) -> Sequence[object]:
         """The events that these bytes complete."""
         ...

@@ -90,6 +90,11 @@ class PacketReceiver:
         """The bytes not decided yet, fewer than `MAX_FRAME`: an unfinished frame, or noise."""
         return self._held
 
+    @property
+    def unfinished(self) -> bool:
+        """Whether what is pending may yet become a packet or an answer; noise never does."""
+        return self._held[:1] == b"\x02"
+
     def receive(self, data: bytes) -> list[Heard]:
         """What these bytes complete, in the order of the wire.
 
