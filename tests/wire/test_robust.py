@@ -17,24 +17,6 @@ from sacbus.wire import (
     nak,
 )
 
-@pytest.mark.parametrize(
-    ("data", "unfinished"),
-    [
-        (b"", False),
-        (b"hello", False),
-        (b"\x02", True),
-        (b"hello" + encode(82, 1, b"m7")[:-1], True),
-        (encode(82, 1, b"m7"), False),
-        # What may be an answer's ending is noise or nothing.
-        (ack(1, 82) + b"\x03", False),
-    ],
-)
-def test_only_a_frame_that_has_begun_is_unfinished(data: bytes, unfinished: bool) -> None:
-    receiver = PacketReceiver()
-    receiver.receive(data)
-    assert receiver.unfinished is unfinished
-
-
 M7 = encode(82, 5, b"m7")
 HEARD_M7 = Packet(82, 5, b"m7", Verdict.RIGHT)
 
@@ -299,3 +281,21 @@ def test_an_answer_is_reported_with_its_fourth_byte() -> None:
     assert receiver.receive(b"\x02\x01\x52") == []
     assert receiver.receive(b"\x06") == [ACCEPTED]
     assert receiver.pending == b""
+
+
+@pytest.mark.parametrize(
+    ("data", "unfinished"),
+    [
+        (b"", False),
+        (b"hello", False),
+        (b"\x02", True),
+        (b"hello" + encode(82, 1, b"m7")[:-1], True),
+        (encode(82, 1, b"m7"), False),
+        # What may be an answer's ending is noise or nothing.
+        (ack(1, 82) + b"\x03", False),
+    ],
+)
+def test_only_a_frame_that_has_begun_is_unfinished(data: bytes, unfinished: bool) -> None:
+    receiver = PacketReceiver()
+    receiver.receive(data)
+    assert receiver.unfinished is unfinished
