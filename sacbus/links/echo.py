@@ -166,7 +166,8 @@ class Echo:
         for expected in range(1, SLIP + 1):
             mark = run.rest[expected : expected + ANCHOR]
             at = held.find(mark) if len(mark) > 1 else -1
-            if at >= 0:
+            # With less than an anchor to go by, only as many bytes as were sent are an echo.
+            if at >= (0 if len(mark) == ANCHOR else expected):
                 self._step(run, at, expected, foreign)
                 run.found = True
                 return True
@@ -179,9 +180,7 @@ class Echo:
         if same:
             self._take(run, same, same)
             return True
-        for heard, expected in _WAYS:
-            if expected > len(rest):
-                continue
+        for heard, expected in _WAYS:  # at the latest, one takes all that is expected
             mark = rest[expected : expected + ANCHOR]
             found = held[heard : heard + len(mark)]
             if len(held) < heard or (found != mark and mark.startswith(found)):

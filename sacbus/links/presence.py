@@ -8,18 +8,22 @@ when.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import ctypes
-import fcntl
 import os
 import struct
 import sys
-import termios
 from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Final
 
-__all__ = ["Hint", "Presence"]
+with contextlib.suppress(ImportError):  # Windows has neither, and no inotify to use them for
+    import fcntl
+    import termios
+
+__all__ = ["Hint", "Presence", "inotify_library"]
 
 # linux/inotify.h. IN_CLOSE is both ways of closing; the overflow comes unasked.
 _IN_CLOSE: Final = 0x08 | 0x10
@@ -128,7 +132,8 @@ class Presence:
             self._inotify = self._loop = None
 
 
-def _inotify_library() -> ctypes.CDLL | None:
+@cache
+def inotify_library() -> ctypes.CDLL | None:
     """The C library, where it has inotify."""
     if not sys.platform.startswith("linux"):
         return None
@@ -136,4 +141,4 @@ def _inotify_library() -> ctypes.CDLL | None:
     return library if hasattr(library, "inotify_init1") else None
 
 
-_LIBC: Final = _inotify_library()
+_LIBC: Final = inotify_library()

@@ -38,7 +38,7 @@ from .errors import LinkError
 if sys.platform != "win32":
     import termios
 
-__all__ = ["BOUND", "SerialConnection"]
+__all__ = ["BOUND", "FAULTS", "SerialConnection", "unopened"]
 
 #: Bytes that wait for a port which does not take them: what the system has no room for. 17 s of a
 #: line at 38400 baud.
@@ -46,7 +46,7 @@ BOUND: Final = 65_536
 
 _CHUNK: Final = 65_536  # the most one read may bring; Linux gives 4 kB at a time
 
-_CHECK: Final = "check the path, and whether the bus is running"
+_CHECK: Final = "check the path, and whether the bus is running or the adapter plugged in"
 _WAIT: Final = "wait until the other program has closed it"
 _REASONS: Final = {
     errno.ENOENT: ("no such file", _CHECK),
@@ -130,9 +130,8 @@ class SerialConnection(asyncio.Protocol):
         self.port.failed = self._failed
         try:
             _open(self.port, path, baud, rts=rts)
-        except _FAULTS as fault:
-            why, remedy = _reason(fault)
-            raise LinkError(f"cannot open the line ({why})", path, remedy) from fault
+        except FAULTS as fault:
+            raise unopened(path, fault) from fault
         self._transport = serial_asyncio.SerialTransport(self._loop, self, self.port)
 
     @property
@@ -221,6 +220,12 @@ def _open(port: _Port, path: str, baud: int, *, rts: bool) -> None:
     port.open()
 
 
+def unopened(path: str, fault: Exception) -> LinkError:
+    """Why a port cannot be had, in one line."""
+    why, remedy = _reason(fault)
+    return LinkError(f"cannot open the line ({why})", path, remedy)
+
+
 def _words(fault: BaseException) -> str:
     """The system's reason in words, without numbers and paths."""
     number = _number(fault)
@@ -248,7 +253,7 @@ def _number(fault: BaseException) -> int | None:
     return number if isinstance(number, int) else None
 
 
-#: What pyserial raises when it opens: SerialException is an OSError, a rate that cannot be set is a
-#: ValueError, or NotImplementedError where the system knows only the usual ones.
+#: What pyserial raises when it opens or sets a port: SerialException is an OSError, a rate that
+#: cannot be set a ValueError, or NotImplementedError where the system knows only the usual ones.
 _USUAL: Final = (OSError, ValueError, NotImplementedError)
-_FAULTS: Final = _USUAL if sys.platform == "win32" else (*_USUAL, termios.error)
+FAULTS: Final = _USUAL if sys.platform == "win32" else (*_USUAL, termios.error)

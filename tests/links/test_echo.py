@@ -33,8 +33,11 @@ def hear(echo: Echo, data: bytes, cuts: list[int]) -> bytes:
 
 
 def told_apart(foreign: bytes, own: bytes) -> bool:
-    """Whether what is foreign does not look like the beginning of what is own."""
-    return (foreign + own).find(own[:ANCHOR]) == len(foreign)
+    """Whether what is foreign looks like no part of the beginning of what is own."""
+    marks = [own[at : at + ANCHOR] for at in range(SLIP + 1)]
+    return (foreign + own).find(marks[0]) == len(foreign) and not any(
+        len(mark) > 1 and (foreign + own).find(mark) < len(foreign) for mark in marks
+    )
 
 
 # ------------------------------------------------------------------------ a line without faults
