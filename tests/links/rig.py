@@ -15,10 +15,12 @@ from typing import Final, Literal
 import pytest
 
 from sacbus.links import Link, LinkCounters, MemoryLink, Presence, PtyLink
+from sacbus.links.adapter import AdapterLink
 from sacbus.links.link import Server
 from sacbus.links.rfc2217 import Rfc2217Server
 from sacbus.links.tcp import TcpServer
 from tests.links.programs import Client, MemoryProgram, PtyProgram, TcpProgram, TelnetProgram
+from tests.links.socat import Wire
 
 __all__ = [
     "BACKENDS",
@@ -41,6 +43,7 @@ Capability = Literal[
     "counts unread",  # it knows what a program that left had not read, and counts it as dropped
     "has rate",  # a program can set its rate, and finds the bus's
     "serves many",  # each program gets a link of its own
+    "hangs up",  # programs find the line dead once it is closed
 ]
 
 
@@ -197,6 +200,24 @@ class ServerRig(Rig):
         self.server.close()
 
 
+class AdapterRig(LinkRig):
+    """An adapter, and programs on the line behind it, which is there before and after them."""
+
+    def __init__(self) -> None:
+        self._wire = Wire()
+        self._wire.plug()
+        link = AdapterLink(self._wire.near, 38_400, tell=lambda _text: None)
+        super().__init__(link, tells_absence=False)
+
+    @property
+    def where(self) -> str:
+        return self._wire.far
+
+    def close(self) -> None:
+        super().close()
+        self._wire.close()
+
+
 @dataclass(frozen=True, slots=True)
 class Backend:
     """A kind of link as the suite meets it: how it is set up, and what not all kinds can do."""
@@ -221,18 +242,30 @@ def _pty_without_inotify() -> Rig:
 #: Every kind of link there is. The suite runs on all of them, and on those that can do what a test
 #: is about where not all can.
 BACKENDS: Final[dict[str, Backend]] = {
-    "memory": backend(_memory, "stands alone", "tells absence", "counts unread", "has rate"),
-    "pty": backend(
-        lambda: LinkRig(PtyLink()), "stands alone", "tells absence", "counts unread", "has rate"
+    "memory": backend(
+        _memory, "stands alone", "tells absence", "counts unread", "has rate", "hangs up"
     ),
-    "pty without inotify": backend(_pty_without_inotify, "stands alone", "has rate"),
-    "tcp": backend(lambda: ServerRig(TcpServer(), TcpProgram), "tells absence", "serves many"),
+    "pty": backend(
+        lambda: LinkRig(PtyLink()),
+        "stands alone",
+        "tells absence",
+        "counts unread",
+        "has rate",
+        "hangs up",
+    ),
+    "pty without inotify": backend(_pty_without_inotify, "stands alone", "has rate", "hangs up"),
+    "tcp": backend(
+        lambda: ServerRig(TcpServer(), TcpProgram), "tells absence", "serves many", "hangs up"
+    ),
     "rfc2217": backend(
         lambda: ServerRig(Rfc2217Server(), TelnetProgram),
         "tells absence",
         "has rate",
         "serves many",
+        "hangs up",
     ),
+    # What is on a real line is there with or without us, at a rate that nobody tells.
+    "adapter": backend(AdapterRig, "stands alone"),
 }
 
 

@@ -269,6 +269,7 @@ async def test_a_closed_link_drops_what_it_is_told_to_send(rig: Rig) -> None:
     assert rig.link.counters.dropped_out == dropped + 6
 
 
+@able_to("hangs up")
 async def test_a_client_of_a_closed_link_finds_the_line_dead(rig: Rig) -> None:
     client = await rig.client_is_known()
     rig.link.close()
