@@ -132,13 +132,15 @@ class TcpLink(asyncio.BufferedProtocol):
         return True
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """asyncio's: the program is there. asyncio has set TCP_NODELAY itself."""
+        """asyncio's: the program is there."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         self.where += f" from {_address(transport.get_extra_info('peername'))}"
         self.counters.clients = 1
-        # Otherwise Linux may hold megabytes for a program that does not read, minutes of a line.
         sock = transport.get_extra_info("socket")
+        # asyncio does so too, but only for a socket that was made with the protocol's number.
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # Otherwise Linux may hold megabytes for a program that does not read, minutes of a line.
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BOUND)
         # Told as soon as the system takes no more, and again when it has taken all.
         transport.set_write_buffer_limits(high=0)
@@ -341,6 +343,10 @@ class TcpServer:
         return bound
 
     def _program(self) -> TcpLink:
+        """asyncio's: somebody has come."""
+        if self._admit is None:
+            # asyncio would fail over its own closed server, and forget to close the connection.
+            raise ConnectionAbortedError("the server was closed while a program was coming in")
         return TcpLink(self._where, self._buffer, self._let_in)
 
     def _let_in(self, link: TcpLink) -> Callable[[], None]:
