@@ -20,6 +20,10 @@ __all__ = ["Writer"]
 #: Texts that wait at most; a reader so far behind is not reading.
 WAITING: Final = 1_000
 
+#: Whoever can wait is held back from this many on, until so few are left.
+MUCH: Final = WAITING // 2
+LITTLE: Final = WAITING // 4
+
 #: Seconds that :meth:`Writer.close` gives a slow reader to take the rest.
 PATIENCE: Final = 2.0
 
@@ -36,6 +40,9 @@ class Writer:
         self._lost: Callable[[OSError], None] | None = lost
         self._missed_text = missed
         self._missed = 0
+        #: Whether somebody waits in :meth:`room`, and what tells them.
+        self._held_back = False
+        self._room = asyncio.Event()
         self._texts: queue.Queue[str | None] = queue.Queue(WAITING)
         try:
             # The descriptor itself: a buffer's lock, held by a thread that waits, blocks the exit.
@@ -55,6 +62,15 @@ class Writer:
         except queue.Full:
             self._missed += 1
 
+    async def room(self) -> None:
+        """Wait while much waits to be written: for whoever can stop what they read from."""
+        self._room.clear()
+        self._held_back = True
+        # Asked only now: from here on, the thread tells when it has come to little.
+        if self._texts.qsize() >= MUCH:
+            await self._room.wait()
+        self._held_back = False
+
     def close(self) -> None:
         """Have the rest written, as far as it is taken in time."""
         try:
@@ -65,15 +81,22 @@ class Writer:
 
     def _run(self) -> None:
         while (text := self._texts.get()) is not None:
+            if self._held_back and self._texts.qsize() <= LITTLE:
+                self._held_back = False
+                self._tell(self._room.set)
             if self._lost is None:
                 continue
             try:
                 self._write(text)
             except OSError as fault:
                 lost, self._lost = self._lost, None
-                # The loop may be closed already, when the last lines go to nobody.
-                if not self._loop.is_closed():
-                    self._loop.call_soon_threadsafe(lost, fault)
+                self._tell(lost, fault)
+
+    def _tell(self, callback: Callable[..., object], *arguments: object) -> None:
+        """Have the loop call back."""
+        # It may be closed already, when the last lines go to nobody.
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(callback, *arguments)
 
     def _write(self, text: str) -> None:
         if self._output is None:

@@ -74,6 +74,39 @@ def test_what_a_reader_does_not_take_is_missed_and_counted_and_saying_it_never_w
     assert text.count(line) + counted >= WAITING + 500
 
 
+def test_who_can_wait_for_room_misses_nothing_however_slow_the_reader() -> None:
+    count = 3 * WAITING
+    read: list[bytes] = []
+
+    def read_to_the_end(pipe: int) -> None:
+        while not (read and read[-1].endswith(b"end\n")):
+            read.append(os.read(pipe, 1_000))
+
+    async def scene(pipe: int) -> None:
+        writer = Writer(lambda fault: pytest.fail(repr(fault)), missed)
+        reader = threading.Thread(target=read_to_the_end, args=(pipe,), daemon=True)
+        held_back = 0
+        async with asyncio.timeout(30):
+            for number in range(count):
+                writer.say(f"{number} {'x' * 100}\n")
+                room = asyncio.ensure_future(writer.room())
+                await asyncio.sleep(0)
+                if not room.done():
+                    held_back += 1
+                    if held_back == 1:  # nobody reads until it has come to that
+                        reader.start()
+                await room
+        writer.say("end\n")
+        writer.close()
+        reader.join(30)
+        assert held_back
+
+    with piped() as pipe:
+        asyncio.run(scene(pipe))
+    lines = b"".join(read).splitlines()
+    assert [int(line.split()[0]) for line in lines[:-1]] == list(range(count))
+
+
 def test_an_output_that_is_gone_is_told_once_in_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     reading, writing = os.pipe()
     os.close(reading)
