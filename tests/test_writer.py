@@ -95,7 +95,7 @@ def test_who_can_wait_for_room_misses_nothing_however_slow_the_reader() -> None:
                     held_back += 1
                     if held_back == 1:  # nobody reads until it has come to that
                         reader.start()
-                await room
+                    await room
         writer.say("end\n")
         writer.close()
         reader.join(30)
