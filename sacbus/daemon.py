@@ -97,16 +97,19 @@ class HostedBus:
         """How many ports there are now: programs that a server let in, ptys, adapters, mothers."""
         return len(self._ports)
 
+    def now(self) -> Ns:
+        """Bus time, brought up to date with the clock."""
+        self.host.arrive(lambda: None)
+        return self.host.kernel.now
+
     def snapshots(self) -> list[Snapshot]:
         """All nodes as they are now."""
-        self.host.arrive(lambda: None)
-        now = self.host.kernel.now
+        now = self.now()
         return [node.snapshot(now) for node in self.bus.nodes]
 
     def snapshot(self, address: int) -> Snapshot:
         """One node as it is now; KeyError when there is none."""
-        self.host.arrive(lambda: None)
-        return self.bus.node(address).snapshot(self.host.kernel.now)
+        return self.bus.node(address).snapshot(self.now())
 
     def tell(self, text: str) -> None:
         """Report something about the line or a link, now."""

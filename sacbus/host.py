@@ -48,9 +48,15 @@ class Host(Contract):
     kernel: Kernel
     #: How late events ran, in wall time; empty where they cannot be late.
     lateness: Lateness
+    #: Told of it when the machine cannot keep up, as :class:`RealHost` does.
+    late_watcher: Callable[[Ns], object] | None
 
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
         """Something came in from the world: bring bus time up to date, then take it in."""
+        ...
+
+    def spare(self) -> float:
+        """Seconds of wall time until something on the bus is due; ``inf`` when nothing ever is."""
         ...
 
     def close(self) -> None:
@@ -101,7 +107,8 @@ class RealHost:
     def bus_now(self) -> Ns:
         """The bus time that the clock shows now."""
         elapsed = (self._loop.time() - self._wall_anchor) * self._speed
-        return self._bus_anchor + int(elapsed * SECOND)
+        # Rounded: truncated, a timer of the loop would find its event one ns short of its time.
+        return self._bus_anchor + round(elapsed * SECOND)
 
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
         """Bring bus time up to date, call back, and see to what follows from it."""
@@ -112,6 +119,13 @@ class RealHost:
             self.kernel.at(self.kernel.now, callback, *arguments)
             return
         self._bring_up_to_date(callback, *arguments)
+
+    def spare(self) -> float:
+        """Seconds until the next event; 0 when one is due, ``inf`` when there is none."""
+        when = self.kernel.next_at()
+        if when is None or self._closed:
+            return inf
+        return max((when - self.bus_now()) / SECOND / self._speed, 0.0)
 
     def close(self) -> None:
         """Stop; no event runs any more."""
@@ -254,10 +268,15 @@ class VirtualHost:
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
         self.lateness = Lateness()
+        self.late_watcher: Callable[[Ns], object] | None = None
 
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
         """Bus time is up to date already."""
         callback(*arguments)
+
+    def spare(self) -> float:
+        """No event is held up by what takes no bus time."""
+        return inf
 
     def close(self) -> None:
         """Nothing to stop: without the loop, no time passes."""

@@ -1,19 +1,24 @@
 """The live table of ``serve``: what the nodes do, redrawn in place on a terminal.
 
-Owns the look of it. Knows snapshots and counts only; where they come from, and how often, is the
-caller's business. A leaf: nothing but the command line imports it.
+Owns the look of it. Knows nodes as far as they can be looked at; which ones, at what time and how
+often is the caller's business. A leaf: nothing but the command line imports it.
+
+Tables are drawn in pieces (``spare.py``): the process that draws has a line to keep in time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
+from typing import Protocol as Contract
 
 import click
 
+from sacbus.kernel import Ns
 from sacbus.node import Snapshot
+from sacbus.spare import Job
 
-__all__ = ["Screen", "table"]
+__all__ = ["Screen", "Seen", "table"]
 
 _HEADINGS: Final = ("node", "state", "steps", "RPM", "current", "pending", "ACK", "NAK")
 #: Width of each column; what is longer widens it while it lasts.
@@ -25,35 +30,72 @@ _GIVE_WAY: Final = (5, 4)
 _LEAST: Final = 8
 _RIGHT: Final = frozenset((0, 2, 3, 6, 7))
 
+#: Nodes whose state is asked for in one piece of work, at about 1 us each.
+_AT_A_LOOK: Final = 16
+
 _COLOURS: Final = {"ACCEL": "green", "CRUISE": "green", "DECEL": "yellow", "SYNC": "magenta"}
 
 
+class Seen(Contract):
+    """What the table asks of a node (``sacbus.node.Node``)."""
+
+    @property
+    def address(self) -> int: ...
+
+    def state(self, now: Ns) -> str: ...
+
+    def snapshot(self, now: Ns) -> Snapshot: ...
+
+
 def table(
-    snapshots: Sequence[Snapshot], columns: int, rows: int, *, colour: bool = False
-) -> list[str]:
+    nodes: Sequence[Seen], now: Callable[[], Ns], columns: int, rows: int, *, colour: bool = False
+) -> Job[list[str]]:
     """The nodes as lines of at most ``columns`` characters, at most ``rows`` of them (>= 3).
 
     When there are more nodes than lines, those that do something come first, and the last line says
-    how many are not shown. Positions in full steps.
+    how many are not shown. Positions in full steps. A job; ``now`` is asked before each look, so
+    every row is true, if not of the same instant.
     """
     room = rows - 1
-    shown = list(snapshots)
+    shown = nodes
     hidden = ""
-    if len(shown) > room:
-        shown.sort(key=lambda snapshot: snapshot.state == "STANDBY")
-        left_out = len(shown) - (room - 1)
-        shown = sorted(shown[: room - 1], key=lambda snapshot: snapshot.address)
-        hidden = f"… and {left_out} more nodes"
-    cells = [_cells(snapshot) for snapshot in shown]
-    widths = _widths(cells, columns)
+    if len(nodes) > room:
+        shown = yield from _busiest(nodes, now, room - 1)
+        hidden = f"… and {len(nodes) - len(shown)} more nodes"
+    cells: list[tuple[str, ...]] = []
+    colours: list[str | None] = []
+    widths = list(_WIDTHS)
+    for node in shown:
+        yield
+        snapshot = node.snapshot(now())
+        row = _cells(snapshot)
+        cells.append(row)
+        colours.append(_COLOURS.get(snapshot.state) if colour else None)
+        for at, cell in enumerate(row):
+            if len(cell) > widths[at]:
+                widths[at] = len(cell)
+    _narrow(widths, columns)
     lines = [_line(_HEADINGS, widths)[:columns]]
-    for snapshot, row in zip(shown, cells, strict=True):
+    for row, wanted in zip(cells, colours, strict=True):
+        yield
         line = _line(row, widths)[:columns]
-        wanted = _COLOURS.get(snapshot.state) if colour else None
         lines.append(click.style(line, fg=wanted) if wanted else line)
     if hidden:
         lines.append(hidden[:columns])
     return lines
+
+
+def _busiest(nodes: Sequence[Seen], now: Callable[[], Ns], room: int) -> Job[list[Seen]]:
+    """As many as there is room for, those in motion first, in order of their addresses."""
+    busy: list[Seen] = []
+    idle: list[Seen] = []
+    for first in range(0, len(nodes), _AT_A_LOOK):
+        yield
+        moment = now()
+        for node in nodes[first : first + _AT_A_LOOK]:
+            (idle if node.state(moment) == "STANDBY" else busy).append(node)
+    yield
+    return sorted((busy + idle)[:room], key=lambda node: node.address)
 
 
 class Screen:
@@ -101,18 +143,13 @@ def _cells(snapshot: Snapshot) -> tuple[str, ...]:
     )
 
 
-def _widths(cells: Sequence[Sequence[str]], columns: int) -> list[int]:
-    """The columns' widths, such that the whole fits into ``columns`` characters if it can."""
-    widths = [
-        max(width, *(len(row[at]) for row in cells)) if cells else width
-        for at, width in enumerate(_WIDTHS)
-    ]
+def _narrow(widths: list[int], columns: int) -> None:
+    """Have the whole fit into ``columns`` characters if it can."""
     excess = sum(widths) + _GAP * (len(widths) - 1) - columns
     for at in _GIVE_WAY:
         given = min(max(excess, 0), widths[at] - _LEAST)
         widths[at] -= given
         excess -= given
-    return widths
 
 
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:

@@ -162,6 +162,13 @@ class Node(Contract):
         """
         ...
 
+    def state(self, now: Ns) -> str:
+        """The state that its snapshot would give at ``now``, at a fraction of the cost.
+
+        A node that does nothing is in STANDBY, whatever its kind.
+        """
+        ...
+
     def snapshot(self, now: Ns) -> Snapshot:
         """What can be seen of it at ``now``; changes nothing."""
         ...

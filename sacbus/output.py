@@ -14,11 +14,13 @@ from typing import Any, Final
 
 from sacbus import __version__
 from sacbus.daemon import HostedBus
-from sacbus.kernel import MS, SECOND
+from sacbus.kernel import MS, SECOND, US, Ns
+from sacbus.lateness import Lateness
 from sacbus.links import Link
 from sacbus.links.link import Server
 from sacbus.live import Screen, table
 from sacbus.node import Report
+from sacbus.spare import Job
 from sacbus.writer import Writer
 
 __all__ = ["Json", "Lines", "Output", "Table", "output_for"]
@@ -64,8 +66,13 @@ class Lines:
         """A report from a bus, as it is made."""
         self.say(f"{self._told(bus, report)}\n")
 
-    def refresh(self) -> None:
+    def late(self, bus: HostedBus, late: Ns) -> None:
+        """The machine cannot keep up: what was due on a bus ran so late, in wall time."""
+        self.say(f"{self._told_late(bus, late)}\n")
+
+    def drawing(self) -> Job[None]:
         """Nothing to draw."""
+        yield from ()
 
     def stopped(self) -> None:
         """Everything is closed: what it has been."""
@@ -73,6 +80,8 @@ class Lines:
         for bus in self._buses:
             counters = bus.bus.medium.counters()
             name = f"bus {bus.bus.name}: " if several else ""
+            if bus.host.lateness.count:
+                self.say(f"{name}{_late(bus.host.lateness)}\n")
             self.say(
                 f"{name}stopped; port closed; {counters.transmissions} transmissions, "
                 f"{counters.bytes} bytes, {counters.collided} collided\n"
@@ -81,6 +90,13 @@ class Lines:
     def _told(self, bus: HostedBus, report: Report) -> str:
         name = f"{bus.bus.name}: " if len(self._buses) > 1 else ""
         return f"{report.when / SECOND:.6f} {_printable(f'{name}{report}')}"
+
+    def _told_late(self, bus: HostedBus, late: Ns) -> str:
+        name = f"{bus.bus.name}: " if len(self._buses) > 1 else ""
+        return (
+            f"{bus.bus.kernel.now / SECOND:.6f} {name}this machine cannot keep up: the line ran "
+            f"{late / MS:.1f} ms late; end other programs, or lower --speed"
+        )
 
 
 class Json(Lines):
@@ -125,6 +141,18 @@ class Json(Lines):
             }
         )
 
+    def late(self, bus: HostedBus, late: Ns) -> None:
+        """Event ``late``."""
+        now = bus.bus.kernel.now
+        self._write(
+            {
+                "event": "late",
+                "bus": bus.bus.name,
+                "time_us": now / US,
+                "late_us": late / US,
+            }
+        )
+
     def stopped(self) -> None:
         """Last of all, ``stopped``."""
         self._write({"event": "stopped", "buses": [_ended(bus) for bus in self._buses]})
@@ -157,7 +185,11 @@ class Table(Lines):
         else:
             self.say(self._screen.above(self._told(bus, report)))
 
-    def refresh(self) -> None:
+    def late(self, bus: HostedBus, late: Ns) -> None:
+        """Above the table too."""
+        self.say(self._screen.above(self._told_late(bus, late)))
+
+    def drawing(self) -> Job[None]:
         """Draw it again."""
         self._reports = 0
         if self._unseen:
@@ -168,10 +200,13 @@ class Table(Lines):
         rows = max((size.lines - 6) // len(self._buses), 3)
         lines: list[str] = []
         for bus, load in zip(self._buses, self._loads, strict=True):
-            if bus.configuration.nodes:
-                lines += table(bus.snapshots(), columns, rows, colour=True)
+            nodes = tuple(bus.bus.nodes)
+            if nodes:
+                lines += yield from table(nodes, bus.now, columns, rows, colour=True)
+            yield
             name = f"{bus.bus.name}: " if len(self._buses) > 1 else ""
-            lines.append(f"{name}{load.line()}"[:columns])
+            lines.append(load.line(name, columns))
+        yield
         self.say(self._screen.draw(lines))
 
 
@@ -184,18 +219,26 @@ class _Load:
         self._when = 0
         self._load = 0.0
 
-    def line(self) -> str:
-        """As one line."""
+    def line(self, name: str, columns: int) -> str:
+        """As one line of at most ``columns`` characters, with how late the bus's events run."""
         counters = self._bus.bus.medium.counters()
         now = self._bus.bus.kernel.now
         # Short looks would jump between 0 and 100 %: average over a fifth of a second or more.
         if now - self._when >= 150 * MS:
             self._load = min((counters.busy - self._busy) / (now - self._when), 1)
             self._busy, self._when = counters.busy, now
-        return (
-            f"line {self._load:.0%} busy, {counters.transmissions} transmissions, "
-            f"{counters.bytes} bytes, {counters.collided} collided"
-        )
+        lateness = self._bus.host.lateness
+        parts = [
+            f"{name}line {self._load:.0%} busy",
+            f"{counters.transmissions} transmissions",
+            f"{counters.bytes} bytes",
+            f"{counters.collided} collided",
+        ]
+        if lateness.count:
+            parts.append(f"late p50 {lateness.p50 // US} p99 {lateness.p99 // US} us")
+        if len(", ".join(parts)) > columns:
+            del parts[2]  # what is least missed
+        return ", ".join(parts)[:columns]
 
 
 Output = Lines | Json | Table
@@ -239,12 +282,19 @@ def _link(link: Link | Server) -> dict[str, object]:
 
 def _ended(bus: HostedBus) -> dict[str, Any]:
     counters = bus.bus.medium.counters()
+    lateness = bus.host.lateness
     return {
         "name": bus.bus.name,
         "transmissions": counters.transmissions,
         "bytes": counters.bytes,
         "collided": counters.collided,
         "reports": dict(bus.bus.report_counts),
+        "lateness": {
+            "count": lateness.count,
+            "p50_us": lateness.p50 / US,
+            "p99_us": lateness.p99 / US,
+            "worst_us": lateness.worst / US,
+        },
         "links": [
             {
                 **_link(link),
@@ -263,6 +313,11 @@ def _ended(bus: HostedBus) -> dict[str, Any]:
             for one in bus.snapshots()
         ],
     }
+
+
+def _late(lateness: Lateness) -> str:
+    p50, p99, worst = (late // US for late in (lateness.p50, lateness.p99, lateness.worst))
+    return f"the line ran late by {p50} us (p50), {p99} us (p99), {worst} us at worst"
 
 
 def _printable(text: str) -> str:

@@ -17,6 +17,7 @@ from typing import Final
 from sacbus.daemon import Configuration, open_bus
 from sacbus.notify import notify
 from sacbus.output import output_for
+from sacbus.spare import at_once, in_spare_time
 
 __all__ = ["serve"]
 
@@ -53,12 +54,13 @@ async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_
             for report in bus.bus.reports:
                 output.report(bus, report)
             bus.bus.report_watchers.append(partial(output.report, bus))
+            bus.host.late_watcher = partial(output.late, bus)
         notify("READY=1")
         while not ended.done():
-            output.refresh()
+            await in_spare_time(output.drawing(), [bus.host for bus in buses])
             await asyncio.wait([ended], timeout=output.interval)
         notify("STOPPING=1")
-        output.refresh()
+        at_once(output.drawing())
         status = ended.result()
     output.stopped()
     output.close()

@@ -1,15 +1,18 @@
-"""The live table is a function of snapshots; the screen redraws it in place."""
+"""The live table is a function of what nodes show; the screen redraws it in place."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sacbus.kernel import Ns
 from sacbus.live import Screen, table
 from sacbus.node import Snapshot
+from sacbus.spare import at_once
 
 
 def a_node(
@@ -36,6 +39,31 @@ def a_node(
     )
 
 
+class Still:
+    """A node that shows the same always, and counts who looks."""
+
+    def __init__(self, snapshot: Snapshot) -> None:
+        self._snapshot = snapshot
+        self.address = snapshot.address
+        self.looked_at: list[Ns] = []
+        self.asked = 0
+
+    def state(self, now: Ns) -> str:
+        self.asked += 1
+        return self._snapshot.state
+
+    def snapshot(self, now: Ns) -> Snapshot:
+        self.looked_at.append(now)
+        return self._snapshot
+
+
+def drawn(
+    snapshots: Sequence[Snapshot], columns: int, rows: int, *, colour: bool = False
+) -> list[str]:
+    nodes = [Still(snapshot) for snapshot in snapshots]
+    return at_once(table(nodes, lambda: 0, columns, rows, colour=colour))
+
+
 def test_a_table_shows_node_state_steps_speed_commands_and_counts() -> None:
     busy = a_node(
         state="CRUISE",
@@ -46,7 +74,7 @@ def test_a_table_shows_node_state_steps_speed_commands_and_counts() -> None:
         acks=3,
         naks=1,
     )
-    assert table([busy, a_node(11, steps=-400)], 100, 10) == [
+    assert drawn([busy, a_node(11, steps=-400)], 100, 10) == [
         "node  state        steps      RPM  current               pending             ACK   NAK",
         "  10  CRUISE         137    120.0  m400v120              2: m1                 3     1",
         "  11  STANDBY       -400      0.0                                              0     0",
@@ -57,7 +85,7 @@ def test_on_80_columns_commands_give_way_and_every_count_is_whole() -> None:
     long = a_node(
         current="m-4000000c3000.5a1.25d1.25", pending=("m123456789v100a1d1",), acks=12345, naks=9876
     )
-    heading, row = table([long], 79, 10)
+    heading, row = drawn([long], 79, 10)
     assert len(row) <= 79
     assert heading.split()[-2:] == ["ACK", "NAK"]
     assert row.split()[-2:] == ["12345", "9876"]
@@ -67,7 +95,7 @@ def test_on_80_columns_commands_give_way_and_every_count_is_whole() -> None:
 
 def test_a_terminal_that_is_narrower_still_gets_lines_that_fit() -> None:
     for columns in range(1, 100):
-        lines = table([a_node(current="m400v120")], columns, 10)
+        lines = drawn([a_node(current="m400v120")], columns, 10)
         assert all(len(line) <= columns for line in lines)
 
 
@@ -76,7 +104,7 @@ def test_a_terminal_that_is_narrower_still_gets_lines_that_fit() -> None:
     [(0, "0"), (400, "400"), (-0.5, "-0.5"), (1_234_567.0, "1234567"), (0.0078125, "0.0078125")],
 )
 def test_positions_are_exact_in_microsteps_too(steps: float, shown: str) -> None:
-    row = table([a_node(steps=steps)], 100, 10)[1]
+    row = drawn([a_node(steps=steps)], 100, 10)[1]
     assert row.split()[2] == shown
 
 
@@ -84,7 +112,7 @@ def test_when_there_are_too_many_nodes_the_busy_ones_are_shown_in_order() -> Non
     nodes = [a_node(address, state="STANDBY") for address in range(10, 30)]
     nodes[7] = a_node(17, state="CRUISE")
     nodes[19] = a_node(29, state="SYNC")
-    lines = table(nodes, 100, 5)
+    lines = drawn(nodes, 100, 5)
     assert len(lines) == 5
     assert [line.split()[:2] for line in lines[1:4]] == [
         ["10", "STANDBY"],
@@ -95,19 +123,42 @@ def test_when_there_are_too_many_nodes_the_busy_ones_are_shown_in_order() -> Non
 
 
 def test_as_many_nodes_as_lines_are_all_shown() -> None:
-    lines = table([a_node(address) for address in (10, 11, 12)], 100, 4)
+    lines = drawn([a_node(address) for address in (10, 11, 12)], 100, 4)
     assert [line.split()[0] for line in lines] == ["node", "10", "11", "12"]
 
 
 def test_colour_stands_for_motion_and_changes_no_text() -> None:
     nodes = [a_node(10, state="ACCEL"), a_node(11), a_node(12, state="DECEL")]
-    plain, coloured = table(nodes, 100, 10), table(nodes, 100, 10, colour=True)
+    plain, coloured = drawn(nodes, 100, 10), drawn(nodes, 100, 10, colour=True)
     assert [re.sub(r"\x1b\[\d*m", "", line) for line in coloured] == plain
     assert ["\x1b[" in line for line in coloured] == [False, True, False, True]
 
 
 def test_a_table_of_no_nodes_is_its_heading() -> None:
-    assert len(table([], 100, 10)) == 1
+    assert len(drawn([], 100, 10)) == 1
+
+
+def test_only_nodes_that_are_shown_are_looked_at_in_full_each_at_its_own_time() -> None:
+    nodes = [Still(a_node(address)) for address in range(10, 30)]
+    nodes += [Still(a_node(100, state="CRUISE"))]
+    at_once(table(nodes, iter(range(1_000)).__next__, 100, 5))
+    looked = [node.looked_at for node in nodes if node.looked_at]
+    assert [node.address for node in nodes if node.looked_at] == [10, 11, 100]
+    assert [len(one) for one in looked] == [1, 1, 1]
+    assert looked == sorted(looked)
+    assert len({one for looks in looked for one in looks}) == 3
+
+
+@pytest.mark.parametrize("rows", [3, 24, 300])
+def test_a_table_is_drawn_in_pieces_however_many_nodes_there_are(rows: int) -> None:
+    nodes = [Still(a_node(address)) for address in range(6, 256)]
+    done = (0, 0)
+    for _ in table(nodes, lambda: 0, 100, rows):
+        asked, looks = sum(node.asked for node in nodes), sum(len(n.looked_at) for n in nodes)
+        assert asked - done[0] <= 16
+        assert looks - done[1] <= 1
+        done = (asked, looks)
+    assert done[1] == min(rows - 2, 250)
 
 
 class Terminal:

@@ -181,6 +181,25 @@ def test_reports_are_json_lines_and_give_line_and_column() -> None:
         assert sacbus.read_event("stopped")["buses"][0]["reports"] == {"refused": 1}
 
 
+def test_a_process_that_was_held_up_says_so_and_by_how_much() -> None:
+    with served("--ephemeral") as sacbus:
+        exchange(sacbus.link, encode(10, 1, b"m100v120a999d999"), ACK_10)
+        sacbus.process.send_signal(signal.SIGSTOP)
+        # Until after the end of the motion, 0.25 s: then it is due.
+        stopped = time.monotonic()
+        until(lambda: time.monotonic() - stopped > 0.5)
+        sacbus.process.send_signal(signal.SIGCONT)
+        late = sacbus.read_event("late")
+        assert late["bus"] == "bus"
+        assert late["late_us"] > 10_000
+        assert late["time_us"] > 0
+        assert sacbus.send_signal(signal.SIGTERM) == 0
+        lateness = sacbus.read_event("stopped")["buses"][0]["lateness"]
+        assert lateness["count"] > 0
+        assert 0 <= lateness["p50_us"] <= lateness["p99_us"] <= lateness["worst_us"]
+        assert lateness["worst_us"] >= late["late_us"]
+
+
 def test_what_was_wrong_with_the_memory_is_told_once_it_serves(tmp_path: Path) -> None:
     (tmp_path / "bus").mkdir()
     (tmp_path / "bus" / "11").write_text("worn")
@@ -283,8 +302,11 @@ def test_the_live_table_shows_the_motor_turn_and_stop_at_exactly_400_steps(
         assert sacbus.send_signal(signal.SIGINT) == 130
         assert rows(sacbus.text, 10)[-1] == ["10", "STANDBY", "400", "0.0", "1", "0"]
         assert rows(sacbus.text, 11)[-1] == ["11", "STANDBY", "0", "0.0", "0", "0"]
-        assert re.search(r"line \d+% busy, 2 transmissions, 18 bytes, 0 collided", sacbus.text)
-        assert re.search(r"stopped; port closed; \d+ transmissions.* collided\r\n$", sacbus.text)
+        # How late that was is no matter of this test; a long figure takes the bytes' place.
+        line = r"line \d+% busy, 2 transmissions,( 18 bytes,)? 0 collided, late p50 \d+ p99 \d+ us"
+        assert re.search(line, sacbus.text)
+        end = r"late by \d+ us \(p50\).*\r\nstopped; port closed; \d+ transmissions.* collided\r\n$"
+        assert re.search(end, sacbus.text)
         assert max(len(line) for lines in drawings(sacbus.text) for line in lines) < 80
 
 

@@ -83,6 +83,10 @@ class SacNode:
         self._commands.wake(now)
         return self._network.wake(now)
 
+    def state(self, now: Ns) -> str:
+        """What the engine does; SYNC while a command is held that has not begun."""
+        return "SYNC" if self._commands.held is not None else self._engine.state(now).name
+
     def snapshot(self, now: Ns) -> Snapshot:
         """State, position and counts at ``now``."""
         commands, engine, network = self._commands, self._engine, self._network
@@ -94,7 +98,7 @@ class SacNode:
         return Snapshot(
             address=self.address,
             kind=self.kind,
-            state="SYNC" if held is not None else engine.state(now).name,
+            state=self.state(now),
             position_steps=pulses / 2**self._memory.ustep,
             position_pulses=pulses,
             rpm=engine.rpm(now),

@@ -58,12 +58,26 @@ def test_a_snapshot_shows_what_runs_and_what_waits() -> None:
     assert snapshot.counters == {"packets": 2, "ack": 2, "nak": 0}
 
 
+def test_the_state_alone_is_that_of_the_snapshot() -> None:
+    bench = Bench()
+    assert bench.node.state(0) == bench.snapshot(0).state == "STANDBY"
+    bench.hears("m200v60a2d2", at=AT)
+    bench.hears("m20v60a2d2s1", at=AT + 20 * MS)
+    states: set[str] = set()
+    for at in range(AT, 3 * SECOND, 7 * MS):
+        snapshot = bench.snapshot(at)
+        assert bench.node.state(at) == snapshot.state
+        states.add(snapshot.state)
+    assert states >= {"ACCEL", "CRUISE", "DECEL", "SYNC"}
+
+
 def test_looking_changes_nothing() -> None:
     looked, unlooked = Bench(), Bench()
     for each in (looked, unlooked):
         each.hears("m200v100a1d1", at=AT)
     for at in range(AT, 2 * SECOND, 7 * MS):
         looked.node.snapshot(at)
+        looked.node.state(at)
         looked.node.persist()
         looked.node.wake_at()
     for each in (looked, unlooked):
