@@ -269,8 +269,26 @@ async def _send(
     }
 
 
-@root.command("plan", context_settings={"ignore_unknown_options": True})
-@click.argument("commands", nargs=-1, required=True, metavar="COMMAND...")
+class _WrongInput(click.ClickException):
+    """What stands in a file or a command is wrong, as an argument is; no help tells more of it."""
+
+    exit_code = USAGE_STATUS
+
+
+@root.command("plan")
+@click.argument("commands", nargs=-1, metavar="[COMMAND]...")
+@click.option("--queue", metavar="FILE.csv", help="Plan a queue file, as the companion writes it.")
+@click.option("--list", "one_shots", metavar="FILE", help="Plan a list of commands, a line each.")
+@click.option("--table", is_flag=True, help="Steps of linear ramps: the manual's Appendix D.")
+@click.option(
+    "--loop",
+    "loops",
+    type=click.IntRange(1, 65_535),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Run the whole N times.",
+)
 @click.option(
     "--ustep",
     type=click.IntRange(0, 7),
@@ -294,7 +312,7 @@ async def _send(
 )
 @click.option(
     "--start-rpm",
-    type=click.IntRange(0),
+    type=click.IntRange(0, 2**32 - 1),
     default=0,
     show_default=True,
     help="Velocity kept from a command before; 0: from rest.",
@@ -305,45 +323,36 @@ async def _send(
     show_default=True,
     help="Whether a kept velocity is lost when the next command comes too late.",
 )
+@click.option("--pulses", metavar="FILE", help="Write the time of every pulse: .csv, .npy or -.")
+@click.option("--plot", "picture", metavar="FILE", help="Draw it: .png or .svg.")
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
 @_verbose
 def plan_command(
-    commands: tuple[str, ...],
     ustep: int,
     sprf: int,
     slow: int,
-    start_rpm: int,
-    gap: bool,
-    as_json: bool,
+    **given: Any,  # noqa: ANN401 (what Request takes under the same names)
 ) -> int:
     """Work out what motion commands do: steps in each state, peak speed, duration, warnings.
 
     Several commands are planned as a sequence, each as soon as the last has ended. A COMMAND of -
-    reads them from standard input, a line each.
+    reads them from standard input, a line each; a FILE of - is standard input or output as well.
 
     \b
     Example: sacbus plan m200v100a1d1
-             sacbus plan m500v100a1d999 m500v100a1d1 --json
+             sacbus plan m500v100a1d999 m500v100a1d1 --plot motion.svg
+             sacbus plan --queue queue.csv --loop 3 --json
     """
-    from sacbus import plan as planning
     from sacbus.motion import Drive
+    from sacbus.plan import PlanError
+    from sacbus.plan.command import Request, carry_out
 
-    lines: list[str] = []
-    for command in commands:
-        if command == "-":
-            lines += [line for line in sys.stdin.read().splitlines() if line.strip()]
-        else:
-            lines.append(command)
     drive = Drive(sprf=sprf, slow_rpm=slow, ustep=ustep)
     try:
-        planned = planning.plan_sequence(lines, drive, start_rpm=start_rpm, gap=gap)
-    except planning.PlanError as fault:
+        carry_out(Request(drive=drive, **given))
+    except PlanError as fault:
         # Caught here, so that no other command waits for numpy to be imported.
-        raise click.ClickException(str(fault)) from fault
-    if as_json:
-        click.echo(json.dumps(planning.as_json(planned)))
-    else:
-        click.echo("\n".join(planning.as_text(planned)))
+        raise _WrongInput(str(fault)) from fault
     return 0
 
 

@@ -1,0 +1,44 @@
+"""A file that appears whole, or not at all.
+
+Owns how a result is put on disk: written beside its place under another name, then renamed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+__all__ = ["fresh_file"]
+
+
+@contextmanager
+def fresh_file(path: Path) -> Iterator[BinaryIO]:
+    """Write a file; it replaces what is at ``path`` when the block ends well, else nothing has.
+
+    Through a symlink its target is replaced; a device or a pipe is written to as it is. OSError,
+    with ``path`` as its file name, when the place cannot be written.
+    """
+    if path.exists() and not path.is_file():  # a directory says so itself
+        with path.open("wb") as file:
+            yield file
+        return
+    place = path.resolve()
+    beside = place.with_name(f".{place.name}.{os.getpid()}.new")
+    try:
+        with beside.open("wb") as file:
+            yield file
+        if place.exists():
+            shutil.copymode(place, beside)
+        beside.replace(place)
+    except OSError as fault:
+        beside.unlink(missing_ok=True)
+        if fault.filename == str(beside):
+            raise OSError(fault.errno, fault.strerror, str(path)) from fault
+        raise
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,78 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from sacbus.plan.fresh import fresh_file
+
+
+def test_a_file_is_there_when_it_is_whole_and_not_before(tmp_path: Path) -> None:
+    place = tmp_path / "result.csv"
+    with fresh_file(place) as file:
+        file.write(b"half")
+        assert not place.exists()
+    assert place.read_bytes() == b"half"
+    assert list(tmp_path.iterdir()) == [place]
+
+
+@pytest.mark.parametrize("fault", [ValueError, OSError, KeyboardInterrupt])
+def test_a_failure_leaves_what_was_there_and_nothing_else(
+    tmp_path: Path, fault: type[BaseException]
+) -> None:
+    place = tmp_path / "result.csv"
+    place.write_bytes(b"old")
+
+    def fail_halfway() -> None:
+        with fresh_file(place) as file:
+            file.write(b"new")
+            raise fault
+
+    with pytest.raises(fault):
+        fail_halfway()
+    assert place.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [place]
+
+
+def test_an_old_file_is_replaced_and_its_mode_kept(tmp_path: Path) -> None:
+    place = tmp_path / "result.csv"
+    place.write_bytes(b"old and longer")
+    place.chmod(0o640)
+    with fresh_file(place) as file:
+        file.write(b"new")
+    assert place.read_bytes() == b"new"
+    assert place.stat().st_mode & 0o777 == 0o640
+
+
+def test_through_a_symlink_its_target_is_replaced(tmp_path: Path) -> None:
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    with fresh_file(link) as file:
+        file.write(b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+def test_a_device_is_written_to_and_stays_a_device(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    try:
+        with fresh_file(Path(f"/dev/fd/{writer}")) as file:
+            file.write(b"pulses")
+        assert os.read(reader, 100) == b"pulses"
+    finally:
+        os.close(reader)
+        os.close(writer)
+
+
+@pytest.mark.parametrize("place", ["missing/result.csv", "."], ids=["no directory", "directory"])
+def test_a_place_that_cannot_be_written_is_named_as_it_was_given(
+    tmp_path: Path, place: str
+) -> None:
+    asked = tmp_path / place
+    with pytest.raises(OSError) as told, fresh_file(asked):  # noqa: PT011 (which one differs)
+        pass
+    assert told.value.filename == str(asked)
