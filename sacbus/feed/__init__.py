@@ -6,7 +6,7 @@ is sent on it, with exact times, senders and collisions (``docs/feed.md``). Look
 nobody: no link is opened, no byte can be sent, and a slow reader only misses lines.
 """
 
-from sacbus.feed.client import Feed, find, running
+from sacbus.feed.client import Feed, SeveralBuses, find, running
 from sacbus.feed.lines import (
     FORMAT,
     Hello,
@@ -31,6 +31,7 @@ __all__ = [
     "Missed",
     "Reached",
     "Sent",
+    "SeveralBuses",
     "Stopped",
     "Way",
     "decode",

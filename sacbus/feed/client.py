@@ -15,13 +15,17 @@ from sacbus.feed.lines import Hello, Line, decode
 from sacbus.feed.places import default_directory, remove_stale, same_link, sockets
 from sacbus.links.errors import LinkError
 
-__all__ = ["Feed", "find", "running"]
+__all__ = ["Feed", "SeveralBuses", "find", "running"]
 
 #: Seconds for a daemon to say hello; one that takes longer is stuck.
 PATIENCE: Final = 3.0
 
 #: The longest line that is read, in bytes: a transmission of 256 KiB, which nothing sends at once.
 LONGEST: Final = 1024 * 1024
+
+
+class SeveralBuses(LinkError):
+    """No link was named, and it cannot be told which of several buses is meant."""
 
 
 class Feed:
@@ -57,7 +61,7 @@ class Feed:
 async def find(link: str | None, directory: Path | None = None) -> Feed | None:
     """The feed of the bus that has ``link`` among its links; None when no such bus runs here.
 
-    Without a link, the feed of the one bus that runs; LinkError when none does, or several.
+    Without a link, the feed of the one bus that runs; LinkError when none does, SeveralBuses.
     """
     feeds = await running(directory)
     if link is None:
@@ -116,4 +120,4 @@ def _not_one(buses: list[Hello]) -> LinkError:
     names = [
         f"{one.bus} ({', '.join(way.where for way in one.links) or 'no links'})" for one in buses
     ]
-    return LinkError("several buses run", ", ".join(names), "give the LINK of one")
+    return SeveralBuses("several buses run", ", ".join(names), "give the LINK of one")
