@@ -83,14 +83,14 @@ class _Port(serial.Serial):
             return data
 
         def write(self, data: bytes, /) -> int:  # type: ignore[override]  # bytes is all we write
-            """How many bytes the system took; all, if it takes none any more."""
+            """How many bytes the system took; 0 when it has no room, or the port is gone."""
             try:
                 return os.write(self.fileno(), data)
             except (BlockingIOError, InterruptedError):
                 return 0
             except OSError as fault:
                 self.failed(_words(fault))
-                return len(data)
+                return 0
 
         def flush(self) -> None:
             """Not wait: pyserial-asyncio calls this in the loop, before it closes."""
@@ -146,7 +146,7 @@ class SerialConnection(asyncio.Protocol):
     def send(self, data: bytes) -> int:
         """Write without waiting; how many bytes were taken. What BOUND leaves no room for is not.
 
-        Bytes given to a port that is gone count as taken only as long as that is not known.
+        Bytes taken that the system had not when the port was lost are in ``lost_unwritten``.
         """
         if self._ended or self._failing or self._transport.is_closing():
             return 0
@@ -253,7 +253,7 @@ def _number(fault: BaseException) -> int | None:
     return number if isinstance(number, int) else None
 
 
-#: What pyserial raises when it opens or sets a port: SerialException is an OSError, a rate that
-#: cannot be set a ValueError, or NotImplementedError where the system knows only the usual ones.
-_USUAL: Final = (OSError, ValueError, NotImplementedError)
+#: What pyserial raises when it opens or sets a port: SerialException is an OSError; a rate that
+#: cannot be set is one of the next two, or the last where the system knows only the usual ones.
+_USUAL: Final = (OSError, ValueError, OverflowError, NotImplementedError)
 FAULTS: Final = _USUAL if sys.platform == "win32" else (*_USUAL, termios.error)
