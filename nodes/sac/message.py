@@ -13,7 +13,17 @@ from typing import Final
 
 from nodes.sac.command import CommandProcessor
 from sacbus.kernel import Ns
-from sacbus.language import Empty, Forward, Message, Move, Parsed, SoftOp, parse
+from sacbus.language import (
+    Empty,
+    Forward,
+    Message,
+    Move,
+    Parsed,
+    SoftOp,
+    UnaryCommand,
+    describe,
+    parse,
+)
 from sacbus.node import ReportKind
 from sacbus.wire import GENERAL_CALL
 
@@ -71,8 +81,11 @@ class MessageProcessor:
                 self._tell(
                     ReportKind.MESSAGE, f"{source}:{destination}> {text.strip()}", self.line, 0
                 )
-            case _:
+            case _ if isinstance(command, UnaryCommand):
                 self._commands.execute(command, now)
+            case _:
+                text = f"not obeyed by this version: {describe(command)}"
+                self._tell(ReportKind.REFUSED, text, self.line, 1)
 
     def _tell_remarks(self, parsed: Parsed) -> None:
         kind = ReportKind.REFUSED if parsed.command is None else ReportKind.WARNING

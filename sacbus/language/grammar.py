@@ -1,21 +1,25 @@
 """One grammar for every line: text to a typed command, or to words about why not.
 
-Owns what a line may look like. ``parse`` never raises, whatever the bytes; what SAC would silently
-do nothing with comes back as no command and one ``Remark`` or more.
+Owns what a line may look like. ``parse`` and ``parse_in`` never raise, whatever the bytes; what SAC
+would silently do nothing with comes back as no command and one ``Remark`` or more.
 
 Theory of operation. A good motion line is recognised whole by one regular expression (``_GOOD``)
-and never looked at again. Everything else goes to a table by its first character (``_READERS``) and
-is read piece by piece, each piece by a reader that knows what it expects; columns are worked out
-only there. Two rules for whoever edits this file: the readers alone define the language, ``_GOOD``
-is a short cut through the part that needs no remark, and the tests hold the two together; and
-alternatives of ``_GOOD`` must not overlap, or a bad line costs exponential time.
+and never looked at again. Everything else goes to a table by its first character (``LETTERS``) and
+is read piece by piece, each piece by a reader that knows what it expects (``readers/``, a file for
+each noun); columns are worked out only there. Two rules for whoever edits this file: the readers
+alone define the language, ``_GOOD`` is a short cut through the part that needs no remark, and the
+tests hold the two together; and alternatives of ``_GOOD`` must not overlap, or a bad line costs
+exponential time.
 
-To add a command: a type in ``commands.py``, a reader here, a row in ``_READERS`` in the place of
-its row in ``_NOT_YET``. The qualifiers of M are a table of their own (``qualifiers.py``).
+To add a command: a type in ``commands/``, its words in ``describe.py``, a reader in ``readers/``, a
+row in a table here or there, and a row in ``docs/commands.md``. The qualifiers of M are a table of
+their own (``qualifiers.py``).
 
 Decisions where the manual is silent: a qualifier given twice counts once, the last one; V without a
-number is the default cycle in a motion command too; RPM has 32 bits like the cycle.
-Source: manual, "Functional Specifications", "Motion", "Accel", "V", Appendix C; spec, "Two ports".
+number is the default cycle in a motion command too; RPM has 32 bits like the cycle; S and s stop
+the motor from every mode of a terminal.
+Source: manual, "Functional Specifications", "Command Detail", "Configure", "System Commands",
+Appendix C; spec, commands.
 """
 
 from __future__ import annotations
@@ -27,30 +31,41 @@ from typing import TYPE_CHECKING, Final
 
 from .commands import (
     BARE,
-    Acceleration,
     Bare,
     Command,
-    Deceleration,
     Empty,
-    Forward,
-    Message,
+    Leave,
+    Mode,
     Move,
     Next,
     ReleaseSync,
-    ShowVelocity,
-    SinglePulses,
+    ShowConfiguration,
+    ShowSession,
     SoftOp,
     Stop,
-    Velocity,
+    ToggleDebug,
+    ToggleGap,
+    Undo,
 )
-from .line import DIGITS, NOTHING, Line, Remark, end_of, short
-from .qualifiers import BITS_32, qualified, read_velocity
+from .line import Line, Remark
+from .readers.loops import read_loop, read_reference, read_set_reference
+from .readers.motion import (
+    read_acceleration,
+    read_deceleration,
+    read_move,
+    read_signs,
+    read_velocity_line,
+)
+from .readers.queue import read_edit, read_queue
+from .readers.reader import Reader, alone, by_letter
+from .readers.system import read_parameter, read_system
+from .readers.traffic import read_forward, read_message
 from .values import maker
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
-__all__ = ["Parsed", "parse"]
+__all__ = ["Parsed", "columns", "parse", "parse_in"]
 
 _CACHED_LINES: Final = 4096
 """Lines remembered: one broadcast goes to 250 nodes, a loop repeats 30 lines."""
@@ -78,6 +93,31 @@ def parse(line: bytes | str) -> Parsed:
     """
     text = line.decode("latin-1") if isinstance(line, bytes) else _one_byte_each(line)
     return _parse(text) if len(text) <= _CACHED_LENGTH else _read(text)
+
+
+def parse_in(mode: Mode, line: bytes | str) -> Parsed:
+    """What a line means that is typed in a mode of a terminal, without its CR; as :func:`parse`.
+
+    In a mode other than the prompt its own lines are known, X that leaves it, and S and s: motion
+    may go on under it, and who watches a motor must be able to stop it. Nothing is sent on from
+    there, and nothing is a message.
+    """
+    if mode is Mode.PROMPT:
+        return parse(line)
+    text = line.decode("latin-1") if isinstance(line, bytes) else _one_byte_each(line)
+    return _read(text, mode)
+
+
+def columns(line: bytes | str, mode: Mode = Mode.PROMPT) -> Mapping[str, int]:
+    """Where each field of a line's command stands: columns from 1, by the name of the field.
+
+    The column is that of the field's letter, or of its number where it has none of its own; of a
+    field that stands twice, that of the one that counts. Fields that the line does not give, or
+    whose value is ignored, have none; nothing has one on a line without a command.
+    """
+    text = line.decode("latin-1") if isinstance(line, bytes) else _one_byte_each(line)
+    read = Line(text)
+    return read.columns if _MODES[mode](read, 0) is not None else {}
 
 
 def _one_byte_each(line: str) -> str:
@@ -162,132 +202,90 @@ _make_move = maker(Move)
 _make_parsed = maker(Parsed)
 
 
-_SIGNS: Final = re.compile(r"[+-]*")
+# --- the readers -------------------------------------------------------------------------------
 
 
-def _move(line: Line) -> Command | None:
-    """``M``, from its second character to the end."""
-    opposite = line.word[1:2] == "-"
-    at = 1 + opposite
-    steps, after = line.number(
-        at, "the number of steps", BITS_32, "the command is refused: without steps it never ends"
-    )
-    if steps is None and after > at:
+SHOW_LETTERS: Final = by_letter({"c": alone(ShowConfiguration()), "f": alone(ShowSession())})
+"""What follows a C."""
+
+
+def _read_show(line: Line, at: int) -> Command | None:
+    reader = SHOW_LETTERS.get(line.word[at : at + 1])
+    if reader is None:
+        line.refuse(at, "C or F after C")
         return None
-    at = after
-    return qualified(line, at, Move(steps, opposite))
+    return reader(line, at + 1)
 
 
-def _velocity(line: Line) -> Command | None:
-    if line.word in ("VD", "Vd", "vD", "vd"):
-        return ShowVelocity()
-    read = read_velocity(line, 1, Move())
-    if read is None or not line.ends(read[1]):
+LETTERS: Final[Mapping[str, Reader]] = {
+    **by_letter(
+        {
+            "m": read_move,
+            "v": read_velocity_line,
+            "a": read_acceleration,
+            "d": read_deceleration,
+            "q": read_queue,
+            "l": read_loop,
+            "x": read_reference,
+            "g": alone(ToggleGap()),
+            "b": alone(ToggleDebug()),
+            "c": _read_show,
+            "z": alone(Undo()),
+        }
+    ),
+    "S": alone(Stop(grace=False)),
+    "s": alone(Stop(grace=True)),
+    "N": alone(Next(grace=False)),
+    "n": alone(Next(grace=True)),
+    "y": alone(ReleaseSync()),
+    "$": read_system,
+    **dict.fromkeys("+-", read_signs),
+    **dict.fromkeys(" .", read_message),
+    **dict.fromkeys("0123456789/", read_forward),
+    "\x11": alone(SoftOp(start=True)),
+    "\x12": alone(SoftOp(start=False)),
+}
+"""First character of a line at the prompt to reader. Case counts where only one of the two is
+here."""
+
+
+def _at_prompt(line: Line, at: int) -> Command | None:
+    if not line.text:
+        return Empty()
+    reader = LETTERS.get(line.text[0])
+    if reader is None:
+        line.refuse(at, "y in lower case" if line.text[0] == "Y" else "a SAC command")
         return None
-    move = read[0]
-    if move.rpm is None and move.cycle_us is None:  # too large, ignored: nothing is left
-        return None
-    return Velocity(move.rpm, move.cycle_us)
+    return reader(line, at + 1)
 
 
-def _acceleration(line: Line) -> Command | None:
-    read = line.hundredths(1, "an acceleration")
-    return Acceleration(read[0]) if read and line.ends(read[1]) else None
+def _inside(read_entry: Reader) -> Reader:
+    """Reader of the lines of a mode that is not the prompt."""
 
-
-def _deceleration(line: Line) -> Command | None:
-    read = line.hundredths(1, "a deceleration")
-    return Deceleration(read[0]) if read and line.ends(read[1]) else None
-
-
-def _signs(line: Line) -> Command | None:
-    after = end_of(_SIGNS, line.word, 0)
-    if after < len(line.word):
-        line.refuse(after, "+ and - alone, one pulse each")
-        return None
-    return SinglePulses(line.word)
-
-
-def _message(line: Line) -> Command | None:
-    """Text, unless it is nothing but spaces: those are padding."""
-    return Message(line.text) if line.text.strip(" ") else Empty()
-
-
-def _forward(line: Line) -> Command | None:
-    after = end_of(DIGITS, line.text, 0)
-    if not after:
-        return Forward(None, line.text[1:])
-    digits = line.text[:after]
-    # 10**8 is a multiple of 256: the low 8 bits of any number are those of its last 8 digits.
-    address = int(digits[-8:]) & 0xFF
-    if len(digits.lstrip("0")) > 3 or int(digits[-8:]) > 255:
-        line.remark(0, "an address of at most 255", short(digits), f"{address} is used")
-    return Forward(address, line.text[after:])
-
-
-def _alone(command: Command) -> Callable[[Line], Command | None]:
-    """Reader of a command that is one character and takes nothing after it."""
-
-    def read(line: Line) -> Command | None:
-        return command if line.ends(1) else None
+    def read(line: Line, at: int) -> Command | None:
+        if not line.text.strip(" "):
+            return Empty()
+        match line.word[:1]:
+            case "x" | "X":
+                return alone(Leave())(line, at + 1)
+            case "s" | "S" as letter:
+                return LETTERS[letter](line, at + 1)
+            case _:
+                return read_entry(line, at)
 
     return read
 
 
-_READERS: Final[Mapping[str, Callable[[Line], Command | None]]] = {
-    **dict.fromkeys("mM", _move),
-    **dict.fromkeys("vV", _velocity),
-    **dict.fromkeys("aA", _acceleration),
-    **dict.fromkeys("dD", _deceleration),
-    **dict.fromkeys("+-", _signs),
-    **dict.fromkeys(" .", _message),
-    **dict.fromkeys("0123456789/", _forward),
-    "S": _alone(Stop(grace=False)),
-    "s": _alone(Stop(grace=True)),
-    "N": _alone(Next(grace=False)),
-    "n": _alone(Next(grace=True)),
-    "y": _alone(ReleaseSync()),
-    "\x11": _alone(SoftOp(start=True)),
-    "\x12": _alone(SoftOp(start=False)),
+_MODES: Final[Mapping[Mode, Reader]] = {
+    Mode.PROMPT: _at_prompt,
+    Mode.QUEUE: _inside(read_edit),
+    Mode.REFERENCES: _inside(read_set_reference),
+    Mode.CONFIGURE: _inside(read_parameter),
 }
-"""First character to reader. Case counts where only one of the two is here."""
-
-_NOT_YET: Final[Mapping[str, str]] = {
-    "XM": "a throw-away motion",
-    "X": "references",
-    "Q": "the queue",
-    "L": "loops",
-    "G": "the GAP test",
-    "B": "debug",
-    "CC": "show the configuration",
-    "CF": "show the session defaults",
-    "Z": "undo",
-    "$": "a system command",
-}
-"""What SAC knows and this version does not: the longest beginning counts, either case."""
 
 
-def _read(text: str) -> Parsed:
+def _read(text: str, mode: Mode = Mode.PROMPT) -> Parsed:
     """Read any line piece by piece: the slow and complete way."""
     line = Line(text)
-    command: Command | None = None
-    if not text:
-        command = Empty()
-    elif (reader := _READERS.get(text[0])) is not None:
-        command = reader(line)
-    else:
-        _refuse_verb(line)
+    command = _MODES[mode](line, 0)
     return Parsed(command, tuple(line.remarks))
-
-
-def _refuse_verb(line: Line) -> None:
-    """Say of a line that no reader takes whether SAC, at least, would know it."""
-    for start in (line.word[:2].upper(), line.word[0].upper()):
-        if start in _NOT_YET:
-            # With its letter, unless that is none that can be shown.
-            name = line.word[:2] if start == "$" and line.word[:2].isprintable() else start
-            got = f"{name} ({_NOT_YET[start]})"
-            why = f"this version does not have it yet; {NOTHING}"
-            line.remark(0, "a command of this version", got, why)
-            return
-    line.refuse(0, "y in lower case" if line.word[0] == "Y" else "a SAC command")

@@ -1,7 +1,8 @@
 """One line under a reader's eye: where words, numbers and remarks come from.
 
-Owns ``Remark`` and the reading of numbers with all that SAC cuts, caps and ignores. Columns are
-worked out here, and only here. Imports nothing of the project but the command types.
+Owns ``Remark``, the reading of numbers with all that SAC cuts, caps and ignores, and the columns at
+which the fields of a command stand: columns are worked out here, and only here. Imports nothing of
+the project but the command types.
 Source: manual, "Accel"; spec, "Motion" (numbers).
 """
 
@@ -11,9 +12,9 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from .commands import BARE, NO_RAMP, Bare
+from .commands import BARE, NO_RAMP, QUEUE_LENGTH, Bare
 
-__all__ = ["DIGITS", "NOTHING", "Line", "Remark", "end_of", "short"]
+__all__ = ["DIGITS", "NOTHING", "Line", "Remark", "end_of", "low_byte", "short"]
 
 NOTHING: Final = "the line does nothing"
 DIGITS: Final = re.compile(r"[0-9]*")
@@ -37,14 +38,22 @@ class Remark:
 
 
 class Line:
-    """A line under a reader's eye: the command up to its first space, and the remarks so far."""
+    """A line under a reader's eye: the command up to its first space, and the remarks so far.
 
-    __slots__ = ("remarks", "text", "word")
+    columns: from 1, of each field of the command that the line gave.
+    """
+
+    __slots__ = ("columns", "remarks", "text", "word")
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.word = text.partition(" ")[0]
         self.remarks: list[Remark] = []
+        self.columns: dict[str, int] = {}
+
+    def stands(self, field: str, at: int) -> None:
+        """Say that a field of the command is what stands at index ``at``."""
+        self.columns[field] = at + 1
 
     def remark(self, at: int, expected: str, got: str, text: str) -> None:
         """Keep a remark on index ``at``."""
@@ -84,6 +93,26 @@ class Line:
             return None
         return value, after
 
+    def within(self, at: int, name: str, least: int, most: int) -> tuple[int, int] | None:
+        """Read a whole number; None, refused, without a digit or out of these bounds."""
+        after = end_of(DIGITS, self.word, at)
+        expected = f"{name}, {least} to {most}"
+        if after == at:
+            self.refuse(at, expected)
+            return None
+        digits = self.word[at:after].lstrip("0") or "0"
+        if len(digits) > len(str(most)) or not least <= int(digits) <= most:
+            self.remark(at, expected, short(digits), NOTHING)
+            return None
+        return int(digits), after
+
+    def position(self, at: int) -> tuple[int, int] | None:
+        """Read a queue position, and the index after it; None when there is none, refused."""
+        read = self.within(at, "a queue position", 1, QUEUE_LENGTH)
+        if read is not None:
+            self.stands("position", at)
+        return read
+
     def hundredths(self, at: int, name: str) -> tuple[int | Bare, int] | None:
         """Read an acceleration in hundredths, cut as the device cuts it; BARE without a number.
 
@@ -117,5 +146,12 @@ def end_of(pattern: re.Pattern[str], text: str, at: int) -> int:
     return pattern.match(text, at).end()  # type: ignore[union-attr]  # it always matches
 
 
+def low_byte(digits: str) -> int:
+    """The low 8 bits of a number of any length, of which SAC keeps no more where it has 8."""
+    # 10**8 is a multiple of 256: the low 8 bits are those of the last 8 digits.
+    return int(digits[-8:]) & 0xFF
+
+
 def short(digits: str) -> str:
+    """What is quoted of a number that may have thousands of digits."""
     return digits if len(digits) <= 20 else f"{digits[:17]}..."

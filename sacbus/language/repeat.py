@@ -2,55 +2,65 @@
 
 Owns mother's list. SAC has no sequence numbers, so a lost ACK leaves open whether a command was
 obeyed; sending again is safe only for what does the same the second time. The list is a list of
-leave: whatever is not on it, unknown lines too, may not be repeated. It covers commands that the
-grammar does not read yet, since mother also talks to real nodes.
+leave: whatever is not on it, unknown lines too, may not be repeated.
 Source: spec, "Mother", Transactions.
 """
 
 from __future__ import annotations
 
-import re
 from typing import Final
 
 from .commands import (
     Acceleration,
+    ClearQueue,
     Deceleration,
+    EditQueue,
     Empty,
-    Move,
+    LoopCount,
+    LoopFinish,
+    LoopStart,
+    MapPins,
+    Ramp,
     ReleaseSync,
+    RestoreQueue,
+    SaveQueue,
+    SendAcks,
+    SendCrcs,
+    SendSoftOps,
+    SetParameter,
     ShowVelocity,
+    StepMode,
     Stop,
     Velocity,
 )
 from .grammar import parse
-from .line import Line
-from .qualifiers import qualified
 
 __all__ = ["repeatable"]
 
-_SETS: Final = (
+_REPEATABLE: Final = (
+    EditQueue,
+    SaveQueue,
+    RestoreQueue,
+    ClearQueue,
     Velocity,
     ShowVelocity,
     Acceleration,
     Deceleration,
+    SetParameter,
+    MapPins,
+    SendCrcs,
+    SendAcks,
+    Ramp,
+    SendSoftOps,
+    StepMode,
     Stop,
     ReleaseSync,
+    LoopStart,
+    LoopFinish,
+    LoopCount,
     Empty,
 )
-
-_SETTINGS: Final = re.compile(
-    r"[qQ][sSrRcC]"
-    r"|[lL][sSfF][0-9]{1,2}"
-    r"|[lL][nN][0-9]{1,5}"
-    r"|\$[HK][0-9]*"
-    r"|\$[LO][01]"
-    r"|\$[FP]"
-    r"|\$C[A-CE-NUa-kmnu](?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
-)
-"""Case counts after the dollar only. $C: the letters of the table of persistent parameters."""
-
-_EDIT: Final = re.compile(r"[qQ]0*(?:[1-9]|[12][0-9]|30)(?![0-9])([mM]-?[0-9]*)?")
-"""A queue edit up to its qualifiers; positions 1 to 30."""
+"""In the order of the spec, and the empty line with which mother scans."""
 
 
 def repeatable(line: bytes) -> bool:
@@ -58,14 +68,4 @@ def repeatable(line: bytes) -> bool:
 
     line: a packet's body. The empty body, with which mother scans, is repeatable as well.
     """
-    if isinstance(parse(line).command, _SETS):
-        return True
-    word = line.decode("latin-1").partition(" ")[0]
-    return _SETTINGS.fullmatch(word) is not None or _is_edit(word)
-
-
-def _is_edit(word: str) -> bool:
-    edit = _EDIT.match(word)
-    if edit is None or (edit[1] is None and edit.end() == len(word)):
-        return False
-    return qualified(Line(word), edit.end(), Move()) is not None
+    return isinstance(parse(line).command, _REPEATABLE)
