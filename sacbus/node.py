@@ -10,6 +10,7 @@ time. Nothing here knows a particular protocol or kind.
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -128,6 +129,8 @@ class Snapshot:
     current: str
     pending: tuple[str, ...]
     counters: Mapping[str, int]
+    #: Where the motor stands in full steps, if that can be elsewhere: it may have stalled.
+    rotor_steps: float | None = None
 
 
 class Node(Contract):
@@ -269,7 +272,8 @@ class Protocol(Contract):
 class NodeSettings:
     """Base of a kind's settings: a frozen dataclass, each field with ``help`` in its metadata.
 
-    Whole numbers carry ``low`` and ``high`` there, words their ``choices``; flags need no more.
+    Whole numbers carry ``low`` and ``high`` there, words their ``choices``, text its ``form`` in
+    words and the ``pattern`` that it matches; flags need no more.
     ``given`` names those that somebody asked for, as opposed to defaults: they win over memory.
     """
 
@@ -400,6 +404,8 @@ def _fields(model: type[NodeSettings]) -> list[dataclasses.Field[Any]]:
 def _fits(metadata: Mapping[str, Any], default: object, value: object) -> bool:
     if "choices" in metadata:
         return value in metadata["choices"]
+    if "pattern" in metadata:
+        return isinstance(value, str) and re.fullmatch(metadata["pattern"], value) is not None
     if isinstance(default, bool) or isinstance(value, bool):
         return isinstance(default, bool) and isinstance(value, bool)
     return isinstance(value, int) and metadata["low"] <= value <= metadata["high"]
@@ -408,6 +414,8 @@ def _fits(metadata: Mapping[str, Any], default: object, value: object) -> bool:
 def _allowed(metadata: Mapping[str, Any], default: object) -> str:
     if "choices" in metadata:
         return " or ".join(metadata["choices"])
+    if "form" in metadata:
+        return str(metadata["form"])
     if isinstance(default, bool):
         return "true or false"
     return f"a whole number from {metadata['low']} to {metadata['high']}"

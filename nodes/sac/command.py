@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import replace
 from typing import Final, Protocol, assert_never
 
-from nodes.sac.engine import TICK, Engine
+from nodes.sac.engine import Engine
 from sacbus.kernel import Ns
 from sacbus.language import (
     Acceleration,
@@ -28,7 +28,16 @@ from sacbus.language import (
     Stop,
     Velocity,
 )
-from sacbus.motion import Drive, Profile, Rpm, gap_passes, load_ticks, plan
+from sacbus.motion import (
+    TICKS_PER_US,
+    Drive,
+    Profile,
+    Rpm,
+    Timebase,
+    gap_passes,
+    load_ticks,
+    plan,
+)
 from sacbus.node import ReportKind
 
 __all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand", "shortest"]
@@ -108,8 +117,8 @@ class CommandProcessor:
         self._drive = drive
         self._engine = engine
         self._soft_ops = soft_ops
-        #: The start that soft ops have yet to tell.
-        self._untold: Ns | None = None
+        #: Whether soft ops have yet to tell of the start.
+        self._untold = False
         self._tell = tell
         #: Positions 1 to 30. The manual's hidden position 0 keeps nothing: continuous motion is
         #: thrown away.
@@ -152,16 +161,21 @@ class CommandProcessor:
         """End the command that is over, and go on with the next."""
         if self.due is None or self.due > now:
             return
-        if self._untold is not None and self._untold <= now:
-            self._tell_start(self._untold)
+        if self._untold and self._engine.begun(now):
+            self._tell_start()
         end = self._engine.end
         if end is not None and end <= now:
             self._finish(end)
             self._load_next(end)
         self._see_what_is_due()
 
+    def set_clock(self, clock: Timebase, now: Ns) -> None:
+        """Pulses are timed by another clock from ``now`` on."""
+        self._engine.set_clock(clock, now)
+        self._see_what_is_due()
+
     def _see_what_is_due(self) -> None:
-        self.due = self._engine.end if self._untold is None else self._untold
+        self.due = self._engine.started if self._untold else self._engine.end
 
     def execute(self, command: MotionCommand, now: Ns) -> None:
         """Do what a command says, at ``now``."""
@@ -244,7 +258,7 @@ class CommandProcessor:
         if motion is None:
             return
         acc = (motion.acc100, motion.dec100, motion.linear)
-        load = load_ticks(acc != self._last_acc) * TICK
+        load = self._engine.processing(load_ticks(acc != self._last_acc))
         self._last_acc = acc
         loaded = max(now, self._free) + load
         if motion.sync:
@@ -260,19 +274,26 @@ class CommandProcessor:
         Seamless when it may start within one more period of the last one's end: then it keeps the
         velocity, and if it was waiting at that end, loading adds no time. Else it starts at slow.
         """
-        start = ready + motion.wait_us * 1_000
+        engine = self._engine
+        wait = motion.wait_us * TICKS_PER_US
         kept = self._kept_rpm
         if kept:
-            if not gap_passes((start - self._last_end) // TICK, self._last_period):
+            late = engine.clock.ticks_in(ready - self._last_end) + wait
+            if not (engine.clock.runs and gap_passes(late, self._last_period)):
                 kept = 0
-            elif was_waiting and not motion.wait_us:
-                start = self._last_end
+            elif was_waiting and not wait:
+                ready = self._last_end
         profile = plan(motion, self._drive, kept)
         self._current = motion
-        self._engine.start(profile, start)
+        engine.start(profile, ready, wait)
         self._warn(profile)
-        if self._soft_ops is not None:
-            self._untold = start
+        if not engine.clock.runs:
+            self._tell(
+                ReportKind.WARNING,
+                "external clock: no edges come, so nothing moves before they do",
+                shortest(motion, self.session.defaults),
+            )
+        self._untold = self._soft_ops is not None
 
     def _warn(self, profile: Profile) -> None:
         for warning in profile.warnings:
@@ -291,10 +312,10 @@ class CommandProcessor:
             self._last_period = profile.last_period
         self._stopping = False
         self._current = None
-        self._engine.finish()
+        self._engine.finish(end)
         if self._soft_ops is not None:
-            if self._untold is not None:
-                self._tell_start(self._untold)
+            if self._untold:
+                self._tell_start()
             self._free = self._soft_ops(start=False, at=end)
             # The packet outlasts the gap (manual, "ops/soft_ops").
             self._kept_rpm = 0
@@ -303,7 +324,7 @@ class CommandProcessor:
         """End what runs with its present pulse, keeping its velocity (N, and what preempts)."""
         if self._engine.profile is None:
             return
-        if now < self._engine.started:
+        if not self._engine.begun(now):
             self._drop_unstarted()
         else:
             self._engine.change(lambda profile, at: profile.cut(at), now)
@@ -312,15 +333,16 @@ class CommandProcessor:
         """The command's first pulse has not come: it never will."""
         self._engine.discard()
         self._current = None
-        self._untold = None
+        self._untold = False
 
-    def _tell_start(self, at: Ns) -> None:
-        self._untold = None
-        if self._soft_ops is not None:
+    def _tell_start(self) -> None:
+        self._untold = False
+        at = self._engine.started
+        if self._soft_ops is not None and at is not None:
             self._soft_ops(start=True, at=at)
 
     def _slow_down(self, dec100: int, linear: bool, now: Ns) -> None:
-        if now < self._engine.started:
+        if not self._engine.begun(now):
             self._drop_unstarted()
         else:
             self._engine.change(
@@ -335,7 +357,7 @@ class CommandProcessor:
         self._kept_rpm = 0
         if self._current is None:
             return
-        if now < self._engine.started:
+        if not self._engine.begun(now):
             self._drop_unstarted()
             return
         self._stopping = True
@@ -377,10 +399,8 @@ class CommandProcessor:
         if profile.duration is not None:
             return  # it is coming to its end: S, s, N, n or another command was heard
         target = self._current = self._at_session_velocity(current)
-        if now < self._engine.started:
-            started = self._engine.started
-            self._engine.discard()
-            self._engine.start(plan(target, self._drive, profile.start_rpm), started)
+        if not self._engine.begun(now):
+            self._engine.replace(plan(target, self._drive, profile.start_rpm))
         else:
             self._engine.change(lambda profile, at: profile.retarget(at, target), now)
         if self._engine.profile is not None:

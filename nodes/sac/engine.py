@@ -1,36 +1,92 @@
 """The motion engine: the profile that is running, since when, and where the motor stands.
 
-Owns the motor's position and the arithmetic between bus time and a profile's ticks. Which command
-runs, and why it ends, is the command processor's business. Nothing here happens per pulse:
-positions are computed when somebody asks.
-Source: manual, "Discussion" (the motion engine).
+Owns the motor's position, the arithmetic between bus time and a profile's ticks, and the clock that
+these are counted by. Which command runs, and why it ends, is the command processor's business.
+Nothing here happens per pulse: positions are computed when somebody asks.
+
+Positions are signed, clockwise positive, from 0 at power up: in pulses, as a counter at the clk pin
+has them; in microsteps (of a full step's 2**ustep), of which a pulse is one except with auto-micro;
+and the rotor's, which is another where the motor has stalled.
+Source: manual, "Discussion" (the motion engine), "Timing", "clock".
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 from sacbus.kernel import Ns
-from sacbus.motion import Profile, State
+from sacbus.motion import Entry, Profile, Slip, State, Timebase, lost, slips
 
-__all__ = ["TICK", "Engine"]
+__all__ = ["Engine", "Where"]
 
-#: The timer's resolution: 2 MHz (manual, "Slow speed").
-TICK: Final[Ns] = 500
+#: A tick of an oscillator without error.
+NOMINAL: Final = Timebase()
+
+#: Legs of a profile that are kept. Each new velocity of continuous motion adds two; beyond this
+#: number what has been is folded into the position, so that it may go on changing for ever.
+LEGS_KEPT: Final = 12
+
+
+class Where(NamedTuple):
+    """A position in pulses, in microsteps, and the rotor's in microsteps."""
+
+    pulses: int = 0
+    microsteps: int = 0
+    rotor: int = 0
+
+
+class _Left(NamedTuple):
+    """How the last profile left the motor turning: until when, and how.
+
+    rpm: signed, clockwise positive; 0 when it came to rest.
+    """
+
+    until: Ns = 0
+    rpm: float = 0.0
+    stalled: bool = False
 
 
 class Engine:
-    """One motor. Positions in pulses, signed, clockwise positive, from 0 at power up."""
+    """One motor.
 
-    __slots__ = ("_profile", "_rest", "_sign", "_started", "end")
+    ``oscillator`` is the node's own; ``external`` the clock that pulses are timed by instead.
+    """
 
-    def __init__(self) -> None:
-        #: Position before the present profile's first pulse.
-        self._rest = 0
+    __slots__ = (
+        "_anchor",
+        "_entry",
+        "_left",
+        "_oscillator",
+        "_profile",
+        "_rest",
+        "_sign",
+        "_slips",
+        "_tick",
+        "clock",
+        "end",
+        "started",
+    )
+
+    def __init__(self, oscillator: Timebase = NOMINAL, external: Timebase | None = None) -> None:
+        self._oscillator = oscillator
+        #: What pulses are timed by. :meth:`set_clock` changes it.
+        self.clock = external or oscillator
+        #: Where the present profile's pulse 0 goes on from.
+        self._rest = Where()
         self._profile: Profile | None = None
         self._sign = 1
-        self._started: Ns = 0
+        #: An instant, and the profile's tick then: negative while the start wait runs.
+        self._anchor: Ns = 0
+        self._tick = 0
+        self._left = _Left()
+        #: How the motor comes into the present profile, and where it does not follow that; None:
+        #: not looked at yet.
+        self._entry = Entry()
+        self._slips: list[Slip] | None = None
+        #: When the present profile's first pulse is issued, it may be to come; None: never, as long
+        #: as the clock stands still.
+        self.started: Ns | None = 0
         #: When the present profile's last period runs out; None when it never does, or none runs.
         self.end: Ns | None = None
 
@@ -39,15 +95,28 @@ class Engine:
         """What is running, or about to start; None when the motor stands."""
         return self._profile
 
-    @property
-    def started(self) -> Ns:
-        """When the present profile's first pulse is issued; it may be to come."""
-        return self._started
+    def begun(self, now: Ns) -> bool:
+        """Whether the present profile's first pulse has come."""
+        return self.started is not None and self.started <= now
 
-    def start(self, profile: Profile, at: Ns) -> None:
-        """Run a profile from ``at`` on; the motor must stand or have :meth:`finish`-ed."""
-        self._started = at
+    def processing(self, ticks: int) -> Ns:
+        """What the node takes for something that its own oscillator times, whatever the clock."""
+        return self._oscillator.span(ticks)
+
+    def start(self, profile: Profile, at: Ns, wait: int = 0) -> None:
+        """Run a profile ``wait`` ticks after ``at``.
+
+        The motor must stand or have :meth:`finish`-ed. Without a clock it begins as many ticks
+        after the clock's first edge.
+        """
+        self._anchor = at
+        self._tick = -wait
         self._sign = 1 if profile.motion.cw else -1
+        self.started = None
+        self._take(profile)
+
+    def replace(self, profile: Profile) -> None:
+        """Have another profile begin when the present one would, which has not issued a pulse."""
         self._take(profile)
 
     def change(self, cut: Callable[[Profile, int], Profile], now: Ns) -> None:
@@ -55,47 +124,140 @@ class Engine:
 
         Only once its first pulse has come; before that it is :meth:`discard`-ed.
         """
-        if self._profile is not None:
-            self._take(cut(self._profile, (now - self._started) // TICK))
+        if self._profile is None:
+            return
+        ticks = self._ticks(now)
+        profile = cut(self._profile, ticks)
+        self._slips = None
+        if profile.duration is None and len(profile.course.legs) > LEGS_KEPT:
+            profile = self._fold(profile, ticks)
+        self._take(profile)
 
-    def finish(self) -> None:
+    def finish(self, at: Ns) -> None:
         """The present profile has run out, or was halted: the motor stands where it got to."""
-        if self._profile is not None:
-            # Only continuous motion has no number of pulses, and that has no end to come to.
-            self._rest += self._sign * (self._profile.pulses or 0)
-        self._profile = None
-        self.end = None
+        profile = self._profile
+        if profile is None:
+            return
+        # Only continuous motion has no number of pulses, and that has no end to come to.
+        pulses = profile.pulses or 0
+        self._left = _Left()
+        if profile.kept_rpm and profile.drive.pull_in_rpm is not None:
+            entry = self._entry_after(profile, pulses)
+            # It turns on for a period; what begins within that does not begin from rest.
+            until = at + self.clock.span(profile.last_period)
+            self._left = _Left(until, self._sign * entry.rpm, entry.stalled)
+        self._rest = self._after(profile, pulses)
+        self.discard()
 
     def discard(self) -> None:
         """Forget a profile that has not issued a pulse."""
         self._profile = None
+        self._slips = None
         self.end = None
+
+    def set_clock(self, clock: Timebase, now: Ns) -> None:
+        """Time pulses by another clock from ``now`` on.
+
+        Ticks that have been counted stand; the one that runs begins anew, as an edge of the new
+        clock would have it (decision).
+        """
+        if not self.begun(now):
+            self.started = None
+        if now > self._anchor:
+            self._tick = self._ticks(now)
+            self._anchor = now
+        self.clock = clock
+        self._schedule()
 
     def step(self, pulses: int) -> None:
         """Single pulses, out of any profile; only while the motor stands."""
-        self._rest += pulses
+        self._rest = Where(*(position + pulses for position in self._rest))
+
+    def where(self, now: Ns) -> Where:
+        """Positions at ``now``."""
+        if self._profile is None or not self.begun(now):
+            return self._rest
+        return self._after(self._profile, self._profile.pulses_at(self._ticks(now)))
 
     def position(self, now: Ns) -> int:
         """Pulses from where the node was switched on, at ``now``."""
-        if self._profile is None or now < self._started:
-            return self._rest
-        return self._rest + self._sign * self._profile.pulses_at((now - self._started) // TICK)
+        if self._profile is None or not self.begun(now):
+            return self._rest.pulses
+        return self._rest.pulses + self._sign * self._profile.pulses_at(self._ticks(now))
 
     def rpm(self, now: Ns) -> float:
-        """Velocity at ``now`` in RPM, signed, clockwise positive."""
-        if self._profile is None or now < self._started:
+        """Velocity of the pulses at ``now`` in RPM, signed, clockwise positive."""
+        if self._profile is None or not self.begun(now):
             return 0.0
-        return self._sign * self._profile.velocity_at((now - self._started) // TICK)
+        clock = self.clock
+        pace = NOMINAL.ns * clock.ticks / clock.ns
+        return self._sign * self._profile.velocity_at(self._ticks(now)) * pace
 
     def state(self, now: Ns) -> State:
         """ACCEL, CRUISE, DECEL; STOP before a profile's first pulse; STANDBY when none is there."""
         if self._profile is None:
             return State.STANDBY
-        if now < self._started:
+        if not self.begun(now):
             return State.STOP
-        return self._profile.state_at((now - self._started) // TICK)
+        return self._profile.state_at(self._ticks(now))
+
+    def _ticks(self, now: Ns) -> int:
+        """The present profile's tick at ``now``."""
+        return self._tick + self.clock.ticks_in(now - self._anchor)
 
     def _take(self, profile: Profile) -> None:
         self._profile = profile
-        duration = profile.duration
-        self.end = None if duration is None else self._started + duration * TICK
+        self._slips = None
+        self._schedule()
+
+    def _schedule(self) -> None:
+        """Work out when the present profile begins, unless it has, and when it ends."""
+        self.end = None
+        if self._profile is None or not self.clock.runs:
+            return
+        span, tick = self.clock.span, self._tick
+        if self.started is None:
+            self.started = self._anchor + span(-tick)
+            left = self._left
+            turns = left.rpm and self.started <= left.until
+            self._entry = Entry(self._sign * left.rpm, left.stalled) if turns else Entry()
+        duration = self._profile.duration
+        if duration is not None:
+            self.end = self._anchor + span(duration - tick)
+
+    def _fold(self, profile: Profile, ticks: int) -> Profile:
+        """The profile from about now on; what it did before goes into the position."""
+        first, tail = profile.tail(ticks)
+        entry = self._entry_after(profile, first) if first else self._entry
+        self._rest = self._after(profile, first)
+        self._entry = entry
+        self._tick -= profile.time_of(first)
+        return tail
+
+    def _after(self, profile: Profile, pulses: int) -> Where:
+        """Where the first so many pulses of a profile bring the motor."""
+        drive = profile.drive
+        travel = profile.course.travel(pulses) if drive.auto_micro else pulses
+        rotor = travel
+        if drive.pull_in_rpm is not None:
+            rotor -= lost(profile.course, self._slips_in(profile), pulses)
+        sign, rest = self._sign, self._rest
+        return Where(
+            rest.pulses + sign * pulses, rest.microsteps + sign * travel, rest.rotor + sign * rotor
+        )
+
+    def _entry_after(self, profile: Profile, pulses: int) -> Entry:
+        """How the motor comes out of the first so many pulses of a profile."""
+        last = pulses - 1
+        pace = profile.course.place_of(last).pace
+        stalled = any(
+            slip.first <= last and (slip.until is None or last < slip.until)
+            for slip in self._slips_in(profile)
+        )
+        return Entry(profile.drive.real_rpm(pace.period, pace.weight), stalled)
+
+    def _slips_in(self, profile: Profile) -> list[Slip]:
+        """Where the motor does not follow a profile that began as the present one did."""
+        if self._slips is None:
+            self._slips = slips(profile.course, profile.drive, self._entry)
+        return self._slips

@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Final
 
 from sacbus.language import Defaults
-from sacbus.motion import Drive
+from sacbus.motion import FACTORY_XFREQ, Drive, PullOut
 
 __all__ = ["Memory"]
 
@@ -28,6 +28,8 @@ _LARGEST: Final[Mapping[str, int]] = {
     "ramp": _ONE_BIT,
     "cw": _ONE_BIT,
     "dir": _ONE_BIT,
+    "clock": _ONE_BIT,
+    "xfreq": _LONG,
     "ihd": _BYTE,
     "xclk": _BYTE,
     "ustep": 7,
@@ -51,6 +53,7 @@ _LARGEST: Final[Mapping[str, int]] = {
 _NOT_ZERO: Final[Mapping[str, int]] = {
     "sprf": 200,
     "cycle": 3000,
+    "xfreq": FACTORY_XFREQ,
     "slow": 1,
     "acc": _NO_RAMP,
     "dec": _NO_RAMP,
@@ -59,10 +62,8 @@ _NOT_ZERO: Final[Mapping[str, int]] = {
 }
 
 
-@lru_cache(maxsize=256)
-def _drive(sprf: int, slow: int, ustep: int, ihd: int, xclk: int, pulse: int) -> Drive:
-    """One for all nodes that are alike: what is worked out for one then serves them all."""
-    return Drive(sprf=sprf, slow_rpm=slow, ustep=ustep, ihd=ihd, xclk=xclk, pulse_us=pulse)
+#: One for all nodes that are alike: what is worked out for one then serves them all.
+_drive = lru_cache(maxsize=256)(Drive)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,8 @@ class Memory:
     ramp: int = 0
     cw: int = 0
     dir: int = 0
+    clock: int = 1
+    xfreq: int = FACTORY_XFREQ
     ihd: int = 8
     xclk: int = 0
     ustep: int = 0
@@ -127,9 +130,28 @@ class Memory:
             full_step=bool(self.full_step),
         )
 
-    def drive(self) -> Drive:
-        """What the motion engine must know of the hardware; the same object for the same values."""
-        return _drive(self.sprf, self.slow, self.ustep, self.ihd, self.xclk, self.pulse)
+    def drive(
+        self,
+        *,
+        auto_micro: bool = False,
+        pull_in_rpm: int | None = None,
+        pull_out: PullOut = (),
+    ) -> Drive:
+        """What the motion engine must know of the hardware; the same object for the same values.
+
+        The arguments are what no memory holds: an option of the node, and its motor.
+        """
+        return _drive(
+            sprf=self.sprf,
+            slow_rpm=self.slow,
+            ustep=self.ustep,
+            ihd=self.ihd,
+            xclk=self.xclk,
+            pulse_us=self.pulse,
+            pull_in_rpm=pull_in_rpm,
+            auto_micro=auto_micro,
+            pull_out=pull_out,
+        )
 
 
 assert {field.name for field in fields(Memory)} == set(_LARGEST)

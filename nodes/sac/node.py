@@ -16,6 +16,7 @@ from nodes.sac.network import NetworkPort
 from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
 from sacbus.language import Session
+from sacbus.motion import Timebase
 from sacbus.node import Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
@@ -34,15 +35,22 @@ class SacNode:
         self._rate = rate
         self._tell_bus = tell
         self._now: Ns = 0
+        #: Frequency of the clock at the xclk pin.
+        self._xclk_hz = settings.xclk_hz
         self._boot(settings.factory_memory(address))
 
     def _boot(self, memory: Memory) -> None:
         """Start anew with this memory, as after a cold boot."""
         self._memory = memory
-        self._engine = Engine()
+        settings = self._settings
+        self._engine = Engine(settings.oscillator, self._external_clock())
         self._commands = CommandProcessor(
             Session.start(memory.defaults()),
-            memory.drive(),
+            memory.drive(
+                auto_micro=settings.auto_micro,
+                pull_in_rpm=settings.pull_in_rpm,
+                pull_out=settings.pull_out_curve,
+            ),
             self._engine,
             self._tell_ops if memory.soft_ops else None,
             self._tell_of_command,
@@ -90,7 +98,8 @@ class SacNode:
     def snapshot(self, now: Ns) -> Snapshot:
         """State, position and counts at ``now``."""
         commands, engine, network = self._commands, self._engine, self._network
-        pulses = engine.position(now)
+        pulses, microsteps, rotor = engine.where(now)
+        per_step = 2**self._memory.ustep
         held = commands.held
         current = commands.current or held
         pending = commands.pending
@@ -99,12 +108,13 @@ class SacNode:
             address=self.address,
             kind=self.kind,
             state=self.state(now),
-            position_steps=pulses / 2**self._memory.ustep,
+            position_steps=microsteps / per_step,
             position_pulses=pulses,
             rpm=engine.rpm(now),
             current="" if current is None else shortest(current, defaults),
             pending=tuple(shortest(one, defaults) for one in pending),
             counters={"packets": network.packets, "ack": network.acks, "nak": network.naks},
+            rotor_steps=rotor / per_step if self._settings.pull_in else None,
         )
 
     def persist(self) -> Mapping[str, int]:
@@ -123,6 +133,23 @@ class SacNode:
                 f"EEPROM: d_id {restored.d_id} is stored and wins over the configured {configured}",
             )
         self._boot(restored)
+
+    def feed_xclk(self, hz: int, now: Ns) -> None:
+        """From ``now`` on a clock of ``hz`` comes to the xclk pin; 0: no edges.
+
+        It matters while the node is set to the external clock. Whoever calls this from outside the
+        bus has the bus ask the node anew when it wants to be woken.
+        """
+        self._now = now
+        self._xclk_hz = hz
+        clock = self._external_clock()
+        if clock is not None:
+            self._commands.set_clock(clock, now)
+
+    def _external_clock(self) -> Timebase | None:
+        """What times pulses instead of the oscillator; None when nothing does."""
+        memory = self._memory
+        return None if memory.clock else Timebase.external(memory.xfreq, self._xclk_hz)
 
     def _network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         self._messages.network_line(body, source, destination, now)

@@ -1,6 +1,7 @@
 """The course of a profile: its legs one after the other, as one row of pulses.
 
-Owns the search for the leg that runs. Times in ticks and pulses from the beginning.
+Owns the search for the leg that runs. Times in ticks, pulses, and *travel* in finest microsteps
+(drive.py), all from the beginning.
 """
 
 from bisect import bisect_right
@@ -22,17 +23,18 @@ class Place(NamedTuple):
 
     @property
     def pace(self) -> Pace:
-        """Nominal speed and real period of the pulse."""
+        """Nominal speed, real period and weight of the pulse."""
         return pace_of(self.leg, self.pulse)
 
 
 class Course:
     """Legs in a row; only the last may go on for ever. Immutable.
 
-    began, before: ticks and pulses ahead of each leg, and of the end where there is one.
+    began, before, went: ticks, pulses and travel ahead of each leg, and of the end where there is
+    one.
     """
 
-    __slots__ = ("before", "began", "legs")
+    __slots__ = ("before", "began", "legs", "went")
 
     def __init__(self, legs: Iterable[Leg]) -> None:
         self.legs: Final = tuple(legs)
@@ -41,8 +43,19 @@ class Course:
             if leg.count is not None and leg.ticks is not None:
                 before.append(before[-1] + leg.count)
                 began.append(began[-1] + leg.ticks)
+        went = before  # where every pulse is a finest microstep, travel is the number of pulses
+        if any(leg.weight != 1 for leg in self.legs):
+            went = [0]
+            for leg in self.legs[: len(before) - 1]:
+                went.append(went[-1] + (leg.count or 0) * leg.weight)
         self.began: Final = began
         self.before: Final = before
+        self.went: Final = went
+
+    @property
+    def pulses(self) -> int | None:
+        """All pulses; None = for ever."""
+        return self.before[-1] if len(self.before) > len(self.legs) else None
 
     def pulse_running(self, ticks: int) -> int:
         """The pulse whose period runs at a time from 0 up to the end."""
@@ -56,28 +69,42 @@ class Course:
 
     def place_of(self, pulse: int) -> Place:
         """Leg of a pulse of the course."""
-        at = bisect_right(self.before, pulse, 0, len(self.legs)) - 1
+        at = self._leg_of(pulse)
         return Place(self.legs[at], pulse - self.before[at])
 
     def time(self, pulse: int) -> int:
         """When a pulse is issued; that after the last one is the end."""
-        at = bisect_right(self.before, pulse) - 1
-        if at == len(self.legs):
-            return self.began[at]
+        if pulse == self.pulses:
+            return self.began[-1]
+        at = self._leg_of(pulse)
         return self.began[at] + self.legs[at].time(pulse - self.before[at])
+
+    def travel(self, pulses: int) -> int:
+        """Microsteps that the first so many pulses turn the motor by."""
+        if pulses == self.pulses:
+            return self.went[-1]
+        at = self._leg_of(pulses)
+        return self.went[at] + (pulses - self.before[at]) * self.legs[at].weight
+
+    def pulse_after(self, travel: int) -> int:
+        """The pulse that goes on from a travel which the course comes past."""
+        at = bisect_right(self.went, travel, 0, len(self.legs)) - 1
+        return self.before[at] + (travel - self.went[at]) // self.legs[at].weight
 
     def times(self, since: int, until: int) -> Ticks64:
         """The times of all pulses in [since, until), rising."""
-        parts: list[Ticks64] = []
-        for at in range(max(0, bisect_right(self.began, since) - 1), len(self.legs)):
-            began = self.began[at]
-            if began >= until:
-                break
-            leg = self.legs[at]
-            low, high = _issued_before(leg, since - began), _issued_before(leg, until - began)
-            if low < high:
-                parts.append(leg.times(low, high) + began)
-        return np.concatenate(parts) if parts else np.empty(0, dtype=np.int64)
+        low, high = self._issued_before(since), self._issued_before(until)
+        out = np.empty(max(0, high - low), dtype=np.int64)
+        at = self._leg_of(low)
+        done = 0
+        while done < out.size:
+            leg, before = self.legs[at], self.before[at]
+            begin = low + done - before
+            upto = out.size if leg.count is None else min(out.size, before + leg.count - low)
+            leg.write(begin, out[done:upto], self.began[at])
+            done = upto
+            at += 1
+        return out
 
     def legs_of_first(self, pulses: int) -> list[Leg]:
         """The legs of the first `pulses` pulses, the last one cut off where they end."""
@@ -89,6 +116,12 @@ class Course:
             legs.append(leg if whole else leg.first(pulses - before))
         return legs
 
+    def legs_after(self, pulses: int) -> list[Leg]:
+        """The legs without the first `pulses` pulses; some are left."""
+        at = self._leg_of(pulses)
+        skipped = pulses - self.before[at]
+        return [self.legs[at].after(skipped) if skipped else self.legs[at], *self.legs[at + 1 :]]
+
     def pulses_in(self, state: State) -> int:
         """Pulses of the finite legs in a state."""
         return sum(leg.count or 0 for leg in self.legs if leg.state is state)
@@ -96,11 +129,13 @@ class Course:
     def _leg_at(self, ticks: int) -> int:
         return bisect_right(self.began, ticks, 0, len(self.legs)) - 1
 
+    def _leg_of(self, pulse: int) -> int:
+        return bisect_right(self.before, pulse, 0, len(self.legs)) - 1
 
-def _issued_before(leg: Leg, ticks: int) -> int:
-    """Pulses of a leg issued earlier than a time from its beginning."""
-    if ticks <= 0:
-        return 0
-    if leg.ticks is not None and ticks > leg.ticks:
-        ticks = leg.ticks
-    return leg.running(ticks - 1) + 1
+    def _issued_before(self, ticks: int) -> int:
+        """Pulses issued earlier than a time."""
+        if ticks <= 0 or not self.legs:
+            return 0
+        if self.pulses is not None and ticks > self.began[-1]:
+            return self.before[-1]
+        return self.pulse_running(ticks - 1) + 1

@@ -4,13 +4,16 @@ Owns the questions a profile asks of each of its parts, in ticks and pulses from
 beginning. A leg is immutable and holds no times of its own: long or short, it costs the same.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
 from sacbus.motion.ramp import Ramp, Ticks64
+
+_COUNT: Final = np.arange(1 << 14, dtype=np.int64)
+"""0, 1, 2, ... for as many pulses as are written at a time: half of a processor's own cache."""
 
 
 class State(Enum):
@@ -35,6 +38,10 @@ class Leg(Protocol):
         """Pulses, at least one; None = for ever."""
 
     @property
+    def weight(self) -> int:
+        """Finest microsteps that each pulse turns the motor by (see drive.py)."""
+
+    @property
     def ticks(self) -> int | None:
         """When the last period has run out; None = never."""
 
@@ -44,14 +51,17 @@ class Leg(Protocol):
     def running(self, ticks: int) -> int:
         """The pulse whose period runs at a time from 0 up to the end."""
 
-    def times(self, first: int, last: int) -> Ticks64:
-        """`time(i)` for i in [first, last)."""
+    def write(self, first: int, out: Ticks64, shift: int) -> None:
+        """Fill `out` with `shift + time(i)` for i from `first` on."""
 
     def speed(self, pulse: int) -> int:
         """Nominal speed (see drive.py) of a pulse."""
 
     def first(self, count: int) -> "Leg":
         """The leg cut off after its first `count` pulses, 0 < count."""
+
+    def after(self, pulses: int) -> "Leg":
+        """The leg without its first pulses; some are left."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +72,7 @@ class Even:
     count: int | None
     period: int
     nominal_speed: int
+    weight: int = 1
 
     @property
     def ticks(self) -> int | None:
@@ -76,9 +87,13 @@ class Even:
         """The pulse whose period runs."""
         return ticks // self.period
 
-    def times(self, first: int, last: int) -> Ticks64:
-        """`time(i)` for i in [first, last)."""
-        return np.arange(first, last, dtype=np.int64) * self.period
+    def write(self, first: int, out: Ticks64, shift: int) -> None:
+        """Fill `out` with `shift + time(i)` for i from `first` on."""
+        begin, period = first * self.period + shift, self.period
+        for at in range(0, out.size, _COUNT.size):
+            part = out[at : at + _COUNT.size]
+            np.multiply(_COUNT[: part.size], period, out=part)
+            part += begin + at * period
 
     def speed(self, pulse: int) -> int:  # noqa: ARG002  the same for all
         """Nominal speed of a pulse."""
@@ -86,7 +101,11 @@ class Even:
 
     def first(self, count: int) -> "Even":
         """The leg cut off after its first `count` pulses."""
-        return Even(self.state, count, self.period, self.nominal_speed)
+        return replace(self, count=count)
+
+    def after(self, pulses: int) -> "Even":
+        """The leg without its first pulses."""
+        return replace(self, count=None if self.count is None else self.count - pulses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +116,7 @@ class Forth:
     ramp: Ramp
     begin: int
     count: int
+    weight: int = 1
 
     @property
     def ticks(self) -> int:
@@ -112,9 +132,9 @@ class Forth:
         began = self.ramp.time(self.begin)
         return self.ramp.index(began + ticks, self.begin + self.count) - self.begin
 
-    def times(self, first: int, last: int) -> Ticks64:
-        """`time(i)` for i in [first, last)."""
-        return self.ramp.times(self.begin + first, self.begin + last) - self.ramp.time(self.begin)
+    def write(self, first: int, out: Ticks64, shift: int) -> None:
+        """Fill `out` with `shift + time(i)` for i from `first` on."""
+        self.ramp.write(self.begin + first, out, shift - self.ramp.time(self.begin))
 
     def speed(self, pulse: int) -> int:
         """Nominal speed of a pulse."""
@@ -126,7 +146,11 @@ class Forth:
 
     def first(self, count: int) -> "Forth":
         """The leg cut off after its first `count` pulses."""
-        return Forth(self.state, self.ramp, self.begin, count)
+        return replace(self, count=count)
+
+    def after(self, pulses: int) -> "Forth":
+        """The leg without its first pulses."""
+        return replace(self, begin=self.begin + pulses, count=self.count - pulses)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +161,7 @@ class Back:
     ramp: Ramp
     end: int
     count: int
+    weight: int = 1
 
     @property
     def ticks(self) -> int:
@@ -154,10 +179,14 @@ class Back:
         left = self.ramp.time(self.end) - ticks
         return self.end - 1 - self.ramp.index(left - 1, self.end)
 
-    def times(self, first: int, last: int) -> Ticks64:
-        """`time(i)` for i in [first, last)."""
-        forwards = self.ramp.times(self.end - last + 1, self.end - first + 1)
-        return self.ramp.time(self.end) - forwards[::-1]
+    def write(self, first: int, out: Ticks64, shift: int) -> None:
+        """Fill `out` with `shift + time(i)` for i from `first` on."""
+        shift += self.ramp.time(self.end)
+        for at in range(0, out.size, _COUNT.size):
+            part = out[at : at + _COUNT.size]
+            last = self.end - first - at
+            forwards = self.ramp.times(last - part.size + 1, last + 1)
+            np.subtract(shift, forwards[::-1], out=part)
 
     def speed(self, pulse: int) -> int:
         """Nominal speed of a pulse."""
@@ -169,4 +198,8 @@ class Back:
 
     def first(self, count: int) -> "Back":
         """The leg cut off after its first `count` pulses."""
-        return Back(self.state, self.ramp, self.end, count)
+        return replace(self, count=count)
+
+    def after(self, pulses: int) -> "Back":
+        """The leg without its first pulses."""
+        return replace(self, end=self.end - pulses, count=self.count - pulses)

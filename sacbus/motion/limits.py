@@ -15,6 +15,7 @@ from sacbus.motion.course import Course, Place
 from sacbus.motion.drive import TICKS_PER_US, Drive, Rpm
 from sacbus.motion.layout import rides_linear
 from sacbus.motion.legs import Back, State
+from sacbus.motion.motor import Entry, slips
 from sacbus.motion.shares import Shares
 
 SHORTEST_PERIOD_US: Final = 2
@@ -37,6 +38,7 @@ class Limit(Enum):
     TARGET = "target"
     FALL = "fall"
     PULL_IN = "pull-in"
+    STALL = "stall"
     COARSE = "coarse"
 
 
@@ -88,13 +90,7 @@ def cautions(
                 f"{motion.steps} steps are too few for the ramps: {motion.rpm} RPM is not reached",
             )
         yield from _of_fall(drive, start_rpm, course)
-    first_rpm = drive.real_rpm(ends[0].pace.period)
-    if drive.pull_in_rpm is not None and not start_rpm and first_rpm > drive.pull_in_rpm:
-        yield Caution(
-            Limit.PULL_IN,
-            f"from rest to {first_rpm:.0f} RPM at once: the motor pulls in up to "
-            f"{drive.pull_in_rpm} RPM and may stall",
-        )
+    yield from _of_motor(drive, start_rpm, course)
     cycle_us = 60_000_000 // (drive.steps_per_rev * motion.rpm) if motion.rpm else 0
     if motion.rpm > COARSE_ABOVE_RPM and motion.cycle_us == cycle_us:
         yield Caution(
@@ -120,6 +116,18 @@ def _of_fastest(period: int, drive: Drive) -> Iterator[Caution]:
         )
 
 
+def _of_motor(drive: Drive, start_rpm: Rpm, course: Course) -> Iterator[Caution]:
+    """Where the motor does not follow, if it is known what it can."""
+    for slip in slips(course, drive, Entry(float(start_rpm))):
+        if start_rpm or slip.first:
+            yield Caution(Limit.STALL, f"the motor stalls at pulse {slip.first}: {slip.why}")
+        else:
+            yield Caution(
+                Limit.PULL_IN,
+                f"{slip.why}: the motor pulls in up to {drive.pull_in_rpm} RPM and may stall",
+            )
+
+
 def _of_fall(drive: Drive, start_rpm: Rpm, course: Course) -> Iterator[Caution]:
     """Deceleration that sets in further below the velocity before it than a step of it makes up."""
     at = next((n for n, leg in enumerate(course.legs) if leg.state is State.DECEL), None)
@@ -132,7 +140,7 @@ def _of_fall(drive: Drive, start_rpm: Rpm, course: Course) -> Iterator[Caution]:
         before = drive.speed(max(start_rpm, drive.slow))
     else:
         return
-    if before > down.ramp.speed(down.end + drive.m):
+    if before > down.ramp.speed(down.end + drive.m // down.weight):
         yield Caution(
             Limit.FALL,
             f"deceleration sets in at {float(drive.rpm(down.speed(0))):.0f} RPM, "

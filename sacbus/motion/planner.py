@@ -8,7 +8,7 @@ Source: manual, "Profile Planning", "Profiles"; spec, "Profile".
 from typing import Final
 
 from sacbus.language import Motion
-from sacbus.motion.drive import NO_RAMP, Drive, Rpm
+from sacbus.motion.drive import Drive, Rpm, has_ramp
 from sacbus.motion.harmonic import harmonic
 from sacbus.motion.profile import Profile
 from sacbus.motion.shares import Shares, harmonic_steps, linear_steps, truncate
@@ -37,12 +37,12 @@ def plan(motion: Motion, drive: Drive, start_rpm: Rpm = 0) -> Profile:
                     n_acc, cruise, n_dec, extra, m, accelerates=n_acc > 0, truncated=False
                 )
                 duration = ramps + (cruise * m + extra) * drive.cruise_period(motion.cycle_us)
-                kept = motion.rpm if motion.dec100 >= NO_RAMP else 0
+                kept = 0 if has_ramp(motion.dec100) else motion.rpm
                 return Profile(motion, drive, start_rpm, shares, duration, kept)
     shares = share_out(motion, drive, start_rpm)
-    ends_at_speed = motion.steps is not None and motion.dec100 >= NO_RAMP
+    ends_at_speed = motion.steps is not None and not has_ramp(motion.dec100)
     kept = motion.rpm if ends_at_speed else 0
-    if not motion.linear and shares.cruise is not None:
+    if not (motion.linear or shares.cruise is None or drive.auto_micro):
         duration = _harmonic_duration(motion, drive, start_rpm, shares)
         if duration >= 0:
             if known is None and not (shares.truncated or motion.pulses):

@@ -1,29 +1,25 @@
 """A profile: one command's pulses, asked about at any time.
 
-Owns the answers; the cuts are made in cuts.py. A profile is immutable: cutting into one gives
-another, which equals the first up to the cut. Times are ticks (0.5 us) from the first pulse,
-totals are Python ints. An instant belongs to what begins at it: a pulse issued at tick t counts as
-done at t, and a cut at t leaves it standing.
+Owns the answers; what a cut leaves is worked out in cuts.py. A profile is immutable: cutting into
+one gives another, which equals the first up to the cut. Times are ticks (0.5 us) from the first
+pulse, totals are Python ints. An instant belongs to what begins at it: a pulse issued at tick t
+counts as done at t, and a cut at t leaves it standing.
 Source: spec, "What an implementation must be able to answer".
 """
 
 from typing import Final, Self
 
+import numpy as np
+
 from sacbus.language import Motion
 from sacbus.motion.course import Course, Place
-from sacbus.motion.drive import NO_RAMP, Drive, Rpm
-from sacbus.motion.layout import (
-    accelerate,
-    cruise_pace,
-    decelerate,
-    lay_out,
-    linear_position,
-    rides_linear,
-)
-from sacbus.motion.legs import Even, Leg, State
+from sacbus.motion.cuts import retargeted, rpm_of, slowed_down
+from sacbus.motion.drive import TICKS_PER_US, Drive, Rpm, has_ramp
+from sacbus.motion.layout import lay_out
+from sacbus.motion.legs import Leg, State
 from sacbus.motion.limits import Caution, cautions, harmless
 from sacbus.motion.ramp import Ticks64
-from sacbus.motion.shares import Shares, harmonic_steps, linear_index
+from sacbus.motion.shares import Shares
 
 WINDOW_END: Final = 1 << 62
 """Pulse times are handed out as int64; a window beyond this many ticks is refused (spec)."""
@@ -94,17 +90,16 @@ class Profile:
     @property
     def pulses(self) -> int | None:
         """All pulses, extra ones included; None = for ever."""
-        return self.shares.pulses
+        # With auto-micro the steps do not tell how many pulses they are made of.
+        return self.course.pulses if self.drive.auto_micro else self.shares.pulses
 
     @property
     def peak_rpm(self) -> float:
         """The fastest the motor turns, by the real periods of its pulses; 0 without a pulse."""
-        fastest = [
-            Place(leg, at).pace.period
-            for leg in self.course.legs
-            for at in (0, (leg.count or 1) - 1)
-        ]
-        return self.drive.real_rpm(min(fastest)) if fastest else 0.0
+        paces = (
+            Place(leg, at).pace for leg in self.course.legs for at in (0, (leg.count or 1) - 1)
+        )
+        return max((self.drive.real_rpm(pace.period, pace.weight) for pace in paces), default=0.0)
 
     @property
     def last_period(self) -> int:
@@ -141,6 +136,13 @@ class Profile:
             return self.pulses or 0
         return self.course.pulse_running(ticks) + 1
 
+    def travel_at(self, ticks: int) -> int:
+        """How far the pulses done at a time turn the motor, in the finest microsteps (drive.py).
+
+        As many as there are pulses, except with auto-micro.
+        """
+        return self.course.travel(self.pulses_at(ticks))
+
     def state_at(self, ticks: int) -> State:
         """The state at a time: STOP at the instant the command ends, STANDBY before and after."""
         if ticks == self.duration:
@@ -151,7 +153,16 @@ class Profile:
         """RPM at a time, by the real period of the pulse that runs; 0 before and after."""
         if not self._moves(ticks):
             return 0.0
-        return self.drive.real_rpm(self.course.place_at(ticks).pace.period)
+        pace = self.course.place_at(ticks).pace
+        return self.drive.real_rpm(pace.period, pace.weight)
+
+    def ustep_at(self, ticks: int) -> int:
+        """The exponent of the microsteps at a time; the drive's own before and after.
+
+        Auto-micro changes it on the way.
+        """
+        weight = self.course.place_at(ticks).leg.weight if self._moves(ticks) else 1
+        return self.drive.ustep - weight.bit_length() + 1
 
     def pulse_times(self, since: int, until: int) -> Ticks64:
         """The times of all pulses in [since, until), rising, as int64.
@@ -161,6 +172,21 @@ class Profile:
         if until > WINDOW_END:
             raise ValueError(f"pulse times end at 2**62 ticks, asked for some until {until}")
         return self.course.times(since, until)
+
+    def clk_falls(self, since: int, until: int) -> Ticks64:
+        """When clk falls again after each of `pulse_times(since, until)`.
+
+        The width of the pulse later, but one tick before the next pulse where that would be too
+        late (decision).
+        """
+        rises = self.pulse_times(since, until)
+        if not rises.size:
+            return rises
+        falls = rises + self.drive.pulse_us * TICKS_PER_US
+        following = self.course.time(self.pulses_at(int(rises[-1])))
+        falls[-1] = min(int(falls[-1]), following - 1)
+        np.minimum(falls[:-1], rises[1:] - 1, out=falls[:-1])
+        return falls
 
     def halt(self, ticks: int) -> "Profile":
         """Stopped with prejudice (S, e-stop): no pulse after `ticks`, ended there, nothing kept."""
@@ -186,19 +212,8 @@ class Profile:
         issued = self.pulses_at(ticks)
         if self._over(ticks) or issued == self.pulses:
             return self
-        place = self.course.place_of(issued - 1)
-        ramp = dec100 if 0 < dec100 < NO_RAMP else 0
-        pulses = self._pulses_to_stop(place, ramp, linear=linear) if ramp else 0
-        if not self.motion.pulses:
-            m = self.drive.m
-            pulses = pulses // m * m
-            pulses += -(issued + pulses) % m
-        legs = self.course.legs_of_first(issued)
-        if ramp:
-            legs += decelerate(self.drive, ramp, pulses, place.pace, linear=linear)
-        elif pulses:
-            legs.append(Even(State.DECEL, pulses, place.pace.period, place.pace.speed))
-        return self._with(self.motion, legs, 0 if ramp else self._rpm_of(issued - 1))
+        legs = slowed_down(self.course, issued, self.motion, self.drive, dec100, linear=linear)
+        return self._with(self.motion, legs, 0 if has_ramp(dec100) else self._rpm_of(issued - 1))
 
     def retarget(self, ticks: int, motion: Motion) -> "Profile":
         """Continuous motion given a new velocity: an ACCEL ramp from the one it has at `ticks`.
@@ -207,38 +222,26 @@ class Profile:
         """
         if self.duration is not None or motion.steps is not None:
             raise ValueError("only continuous motion takes a new velocity while it runs")
-        drive = self.drive
-        issued = self.pulses_at(ticks)
-        place = self.course.place_of(issued - 1)
-        legs = self.course.legs_of_first(issued)
-        if motion.rpm > drive.slow and 0 < motion.acc100 < NO_RAMP:
-            present = self._rpm_of(issued - 1)
-            index = 0
-            if motion.linear:
-                index = linear_position(place.leg, place.pulse, motion.acc100, drive)
-                target = linear_index(motion.rpm, motion.acc100, drive.steps_per_rev) * drive.m
-                pulses = abs(target - index)
-            else:
-                start = max(present, drive.slow)
-                pulses = harmonic_steps(start, motion.rpm, motion.acc100) * drive.m
-            if pulses:
-                legs.append(accelerate(motion, drive, present, index, pulses))
-        cruise = cruise_pace(motion, drive)
-        legs.append(Even(State.CRUISE, None, cruise.period, cruise.speed))
-        return self._with(motion, legs, 0)
+        return self._with(
+            motion, retargeted(self.course, self.pulses_at(ticks), motion, self.drive), 0
+        )
 
-    def _pulses_to_stop(self, place: Place, dec100: int, *, linear: bool) -> int:
-        """Pulses from the velocity of a pulse down to the end of a ramp."""
-        drive = self.drive
-        over = place.pace.speed - drive.slow_speed
-        if over <= 0 and not (linear and rides_linear(place.leg)):
-            return 0
-        if linear:
-            return linear_position(place.leg, place.pulse, dec100, drive)
-        return over // dec100 if self.motion.pulses else over // (dec100 * drive.m) * drive.m
+    def tail(self, ticks: int) -> tuple[int, "Profile"]:
+        """Continuous motion from a pulse at or before `ticks` on: that pulse, and the profile.
+
+        Its tick 0 is the pulse's. What re-targeting has piled up before is not in it. The pulse is
+        the first of a full step, counted from the command's beginning, so that what counts from
+        there goes on doing so.
+        """
+        course, m = self.course, self.drive.m
+        running = course.pulse_running(ticks)
+        first = course.pulse_after(course.travel(running) // m * m)
+        cut = self._with(self.motion, course.legs_after(first), 0)
+        start_rpm = self._rpm_of(first)
+        return first, Profile(self.motion, self.drive, start_rpm, cut.shares, None, 0, cut.course)
 
     def _rpm_of(self, pulse: int) -> Rpm:
-        return self.drive.rpm(self.course.place_of(pulse).pace.speed)
+        return rpm_of(self.course.place_of(pulse), self.drive)
 
     def _ended(self, pulses: int, duration: int, kept_rpm: Rpm) -> "Profile":
         """Cut off after some pulses; a cut profile counts its shares in pulses."""

@@ -35,6 +35,9 @@ PAGE: Final = 2048
 
 PAGES_KEPT: Final = 64
 
+CHUNK: Final = 1 << 15
+"""Pulses of a page written at a time: what lies between then stays in the processor's cache."""
+
 FAR: Final = 1 << 50
 """A pulse index beyond every ramp: 32-bit steps at 128 microsteps stay below 2**39."""
 
@@ -67,6 +70,22 @@ class _Page(NamedTuple):
     periods: Ticks64
     """Real period of each run."""
 
+    def time(self, index: int) -> int:
+        """When a pulse of the page is issued."""
+        run = int(self.starts.searchsorted(index, "right")) - 1
+        return int(self.times[run]) + (index - int(self.starts[run])) * int(self.periods[run])
+
+    def write(self, first: int, out: Ticks64, shift: int) -> None:
+        """Fill `out` with `shift +` the times of the page's pulses from `first` on."""
+        starts = self.starts
+        low = int(starts.searchsorted(first, "right")) - 1
+        high = int(starts.searchsorted(first + out.size, "left"))
+        ends = np.clip(starts[low : high + 1], first, first + out.size)
+        steps = np.repeat(self.periods[low:high], ends[1:] - ends[:-1])
+        out[0] = 0
+        np.cumsum(steps[:-1], out=out[1:])
+        out += self.time(first) + shift
+
 
 class Ramp:
     """The exact times of one ramp, from its pulse 0 upwards; shared, so never change one.
@@ -94,9 +113,7 @@ class Ramp:
         if index <= HEAD:
             self._grow(index)
             return self.sums[index]
-        page = _page(self, self._page_with_index(index))
-        run = int(page.starts.searchsorted(index, "right")) - 1
-        return int(page.times[run]) + (index - int(page.starts[run])) * int(page.periods[run])
+        return _page(self, self._page_with_index(index)).time(index)
 
     def period(self, index: int) -> int:
         """Real ticks of the pulse at `index`."""
@@ -118,24 +135,29 @@ class Ramp:
         run = int(page.times.searchsorted(ticks, "right")) - 1
         return int(page.starts[run]) + (ticks - int(page.times[run])) // int(page.periods[run])
 
+    def write(self, first: int, out: Ticks64, shift: int) -> None:
+        """Fill `out` with `shift + time(i)` for i from `first` on."""
+        last = first + out.size
+        done = 0
+        if first <= HEAD:
+            upto = min(last, HEAD + 1)
+            self.time(upto - 1)
+            done = upto - first
+            head = np.frombuffer(self.sums, dtype=np.int64)[first:upto]
+            np.add(head, shift, out=out[:done])
+        while first + done < last:
+            begin = first + done
+            page = _page(self, self._page_with_index(begin))
+            upto = min(last, begin + CHUNK, int(page.starts[-1]))
+            page.write(begin, out[done : upto - first], shift)
+            done = upto - first
+
     def times(self, first: int, last: int) -> Ticks64:
         """`time(i)` for i in [first, last), as one array."""
-        parts: list[Ticks64] = []
-        if first <= HEAD:
-            self.time(min(max(last - 1, 0), HEAD))
-            parts.append(np.frombuffer(self.sums, dtype=np.int64)[first : min(last, HEAD + 1)])
-            first = HEAD + 1
-        while first < last:
-            page = _page(self, self._page_with_index(first))
-            stop = min(last, int(page.starts[-1]))
-            index = np.arange(first, stop, dtype=np.int64)
-            run = page.starts.searchsorted(index, "right") - 1
-            index -= page.starts[run]
-            index *= page.periods[run]
-            index += page.times[run]
-            parts.append(index)
-            first = stop
-        return np.concatenate(parts) if parts else np.empty(0, dtype=np.int64)
+        out = np.empty(max(0, last - first), dtype=np.int64)
+        if out.size:
+            self.write(first, out, 0)
+        return out
 
     def _grow(self, index: int) -> None:
         """Make the head reach `index`; doubling, so that the work stays in proportion."""

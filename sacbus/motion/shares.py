@@ -4,13 +4,16 @@ Owns the step counts and truncation. Everything truncates, as the device does.
 Source: manual, "Profile Planning", "Profiles"; spec, "Profile".
 """
 
-from math import pi
 from typing import Final, NamedTuple
 
-from sacbus.motion.drive import NO_RAMP, Rpm
+from sacbus.motion.drive import Rpm, has_ramp
 
 LONGEST_RAMP: Final = 1 << 42
 """Full steps a linear ramp is given at most; its periods are down to a tick long before."""
+
+PI: Final = 3_1415926535_8979323846_2643383279_5028841971
+PI_SCALE: Final = 10**40
+"""Pi as an integer: steps are counted without a float, whatever velocity a 32-bit V asks for."""
 
 
 class Shares(NamedTuple):
@@ -47,7 +50,7 @@ def harmonic_steps(v0: Rpm, target: Rpm, acc100: int) -> int:
     Speeds in RPM; acc100 in hundredths of an RPM per full step; 0 and 999 mean no ramp.
     10 -> 100 at 0.5 takes 180.
     """
-    if not 0 < acc100 < NO_RAMP:
+    if not has_ramp(acc100):
         return 0
     gap = target - v0
     return int((gap if gap > 0 else -gap) * 100 // acc100)
@@ -59,12 +62,14 @@ def linear_index(rpm: Rpm, acc100: int, steps_per_rev: int) -> int:
     rpm unrounded in rad/s; acc100 in hundredths of a rad/s2. 100 RPM at 10.47 takes 166.
     At most LONGEST_RAMP, whatever speed a 32-bit V asks for.
     """
-    return min(int(pi * float(rpm) ** 2 * steps_per_rev / (36 * acc100)), LONGEST_RAMP)
+    squared = rpm.numerator**2 * steps_per_rev * PI
+    steps = squared // (rpm.denominator**2 * 36 * acc100 * PI_SCALE)
+    return min(steps, LONGEST_RAMP)
 
 
 def linear_steps(v0: Rpm, target: Rpm, acc100: int, steps_per_rev: int) -> int:
     """Full steps a linear ramp takes between two speeds, up or down; 0 is standstill."""
-    if not 0 < acc100 < NO_RAMP:
+    if not has_ramp(acc100):
         return 0
     there = linear_index(target, acc100, steps_per_rev)
     return abs(there - linear_index(v0, acc100, steps_per_rev))

@@ -5,12 +5,13 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodes.sac.engine import TICK, Engine
+from nodes.sac.engine import Engine
 from sacbus.kernel import MS, SECOND, Ns
 from sacbus.language import Motion
 from sacbus.motion import Drive, Profile, State, plan
 
 START: Ns = 5 * SECOND
+TICK: Ns = 500
 #: 10 RPM: no ramps, 30 ms a step.
 STEP: Ns = 30 * MS
 
@@ -44,7 +45,7 @@ def test_anticlockwise_counts_down() -> None:
     engine.start(profile(cw=False), START)
     assert engine.position(START + STEP) == -2
     assert engine.rpm(START) == -10
-    engine.finish()
+    engine.finish(START)
     assert engine.position(START) == -3
 
 
@@ -52,7 +53,7 @@ def test_one_profile_after_another_adds_up() -> None:
     engine = Engine()
     for cw, stands in ((True, 3), (True, 6), (False, 3)):
         engine.start(profile(cw=cw), START)
-        engine.finish()
+        engine.finish(SECOND)
         assert engine.position(SECOND) == stands
         assert (engine.profile, engine.end) == (None, None)
 
@@ -60,8 +61,8 @@ def test_one_profile_after_another_adds_up() -> None:
 def test_finishing_twice_is_finishing_once() -> None:
     engine = Engine()
     engine.start(profile(), START)
-    engine.finish()
-    engine.finish()
+    engine.finish(SECOND)
+    engine.finish(SECOND)
     assert engine.position(0) == 3
 
 
@@ -91,7 +92,7 @@ def test_a_cut_is_made_at_the_tick_that_runs_and_moves_the_end() -> None:
     engine.change(halt, START + STEP + TICK - 1)
     assert asked == [STEP // TICK]
     assert engine.end == START + STEP
-    engine.finish()
+    engine.finish(START + STEP)
     assert engine.position(0) == 2
 
 
@@ -124,6 +125,6 @@ def test_whatever_was_run_the_motor_stands_where_the_steps_add_up_to(
         end = engine.end
         assert end is not None
         assert engine.position(end) == stands
-        engine.finish()
+        engine.finish(end)
         assert engine.position(end) == stands
         now = end + MS

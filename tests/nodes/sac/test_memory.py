@@ -20,6 +20,8 @@ def test_the_factory_values_are_those_of_the_manual() -> None:
         "ramp": 0,
         "cw": 0,
         "dir": 0,
+        "clock": 1,
+        "xfreq": 1_000_000,
         "ihd": 8,
         "xclk": 0,
         "ustep": 0,
@@ -75,6 +77,7 @@ def test_a_value_that_does_not_fit_is_left_out_and_named(
     [
         ("sprf", 200),
         ("cycle", 3000),
+        ("xfreq", 1_000_000),
         ("slow", 1),
         ("acc", 99_900),
         ("dec", 99_900),
