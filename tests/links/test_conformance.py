@@ -37,6 +37,7 @@ async def turn_the_loop() -> None:
         await asyncio.sleep(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BACKENDS)
 @given(
     said=st.lists(st.binary(min_size=1, max_size=600), max_size=6),

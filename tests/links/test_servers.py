@@ -20,7 +20,7 @@ from sacbus.links.link import Server
 from sacbus.links.rfc2217 import Rfc2217Link, Rfc2217Server
 from sacbus.links.tcp import TcpServer
 from tests.links.programs import TcpProgram, TelnetProgram
-from tests.links.rig import Ear, ServerRig, until
+from tests.links.rig import BACKENDS, Ear, ServerRig, rig_of, until
 
 pytestmark = pytest.mark.asyncio
 
@@ -32,7 +32,7 @@ KINDS: dict[str, tuple[type[TcpServer | Rfc2217Server], type[TcpProgram]]] = {
 }
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=[name for name, kind in BACKENDS.items() if "serves many" in kind.can])
 def kind(request: pytest.FixtureRequest) -> str:
     name = request.param
     assert isinstance(name, str)
@@ -46,11 +46,9 @@ def server(kind: str) -> type[TcpServer | Rfc2217Server]:
 
 @pytest_asyncio.fixture
 async def rig(kind: str) -> AsyncIterator[ServerRig]:
-    server, program = KINDS[kind]
-    rig = ServerRig(server(), program)
-    await rig.start()
-    yield rig
-    rig.close()
+    async with rig_of(kind) as rig:
+        assert isinstance(rig, ServerRig)
+        yield rig
 
 
 def ignore(link: Link) -> Callable[[], None]:
@@ -125,6 +123,7 @@ async def test_sixty_four_programs_may_come_at_once(rig: ServerRig) -> None:
     assert rig.counters.clients == 64
 
 
+@pytest.mark.slow
 async def test_a_program_that_does_not_read_holds_up_nobody(rig: ServerRig) -> None:
     await rig.client_is_known()
     ear = Ear(await rig.client_is_known())
@@ -511,6 +510,7 @@ async def test_a_link_tells_in_its_place_which_program_it_is(rig: ServerRig) -> 
 async def test_a_system_without_a_socket_to_give_is_told_in_one_line(
     server: type[TcpServer | Rfc2217Server],
 ) -> None:
+    "".encode("idna")  # Python loads the codec of host names on first use, which needs a file
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (3, hard))
     try:
