@@ -18,11 +18,14 @@ __all__ = ["Curve", "Mark", "curve_of"]
 
 TICKS_PER_SECOND: Final = 1_000_000 * TICKS_PER_US
 
-POINTS: Final = 3_000
+POINTS: Final = 1_500
 """Pulses that are followed in the whole of a plan, for each of the three states."""
 
 FEWEST: Final = 4
 """... but at least these for each command."""
+
+EVEN: Final = 40
+"""More pulses than these of a cruise are a straight line to the eye: two of them tell it."""
 
 MOVING: Final = (State.ACCEL, State.CRUISE, State.DECEL)
 
@@ -85,8 +88,8 @@ def curve_of(plan: Iterable[Planned], survey: Survey) -> Curve:
                 curve.spans[state].append(
                     ((start + begin) / TICKS_PER_SECOND, (end - begin) / TICKS_PER_SECOND)
                 )
-                least = 2 if state is State.CRUISE else detail
-                for pulse, last in _followed(done, count, detail, least):
+                most, few = (min(EVEN, detail), 2) if state is State.CRUISE else (detail, detail)
+                for pulse, last in _followed(done, count, most, few):
                     at = profile.time_of(pulse)
                     rpm = sign * profile.velocity_at(at)
                     curve.add(start + at, rpm, position + sign * (pulse + 1))
@@ -115,13 +118,13 @@ def _shown_of_endless(profile: Profile, start: int, ramp: int) -> int:
     return profile.pulses_at(begin + max(TICKS_PER_SECOND, (start + begin) // 4)) - ramp
 
 
-def _followed(first: int, count: int, detail: int, least: int) -> list[tuple[int, int | None]]:
+def _followed(first: int, count: int, most: int, few: int) -> list[tuple[int, int | None]]:
     """The pulses to look at, and for each the pulse up to whose time it holds its velocity.
 
-    Up to ``detail`` pulses all of them, each held up to the next; else ``least`` spread evenly,
-    the last of which is held to the end.
+    Up to ``most`` pulses all of them, each held up to the next; else ``few`` spread evenly, the
+    last of which is held to the end.
     """
-    if count <= detail:
+    if count <= most:
         return [(pulse, pulse + 1) for pulse in range(first, first + count)]
-    spread = [first + (count - 1) * n // (least - 1) for n in range(least)]
+    spread = [first + (count - 1) * n // (few - 1) for n in range(few)]
     return [*((pulse, None) for pulse in spread[:-1]), (spread[-1], first + count)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -247,6 +248,22 @@ def test_a_place_that_cannot_be_written_is_named(capsys: Captured, directory: Pa
     assert run(["plan", "m2", "--pulses", "none/a.csv"]) == 1
     written = capsys.readouterr()
     assert (written.out, written.err) == ("", "error: No such file or directory, none/a.csv\n")
+
+
+# --------------------------------------------------------------------------------- docs
+
+
+def test_the_page_on_planning_shows_what_is_printed(capsys: Captured, directory: Path) -> None:
+    row = "1,200,0,1,100,3000,0,1,1,0,0,0\n"
+    (directory / "queue.csv").write_text(row * 6 + "7,200,0,1,100,fast,0,1,1,0,0,0\n")
+    page = (DATA.parents[1] / "docs" / "planning.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```console\n\$ sacbus (.*)\n((?:[^`$].*\n)+)```", page)
+    assert len(blocks) == 3
+    for arguments, expected in blocks:
+        run(arguments.split())
+        written = capsys.readouterr()
+        shown, _, _ = expected.partition("…")
+        assert (written.out + written.err).startswith(shown)
 
 
 # ------------------------------------------------------------------------------ progress
