@@ -72,7 +72,7 @@ async def find(link: str | None, directory: Path | None = None) -> Feed | None:
         if feed is not chosen:
             await feed.close()
     if chosen is None and link is None:
-        raise _not_one([feed.hello for feed in feeds])
+        raise _not_one([feed.hello for feed in feeds], directory)
     return chosen
 
 
@@ -114,9 +114,10 @@ def _has(hello: Hello, link: str) -> bool:
     return any(same_link(link, way) for way in hello.links)
 
 
-def _not_one(buses: list[Hello]) -> LinkError:
+def _not_one(buses: list[Hello], directory: Path | None) -> LinkError:
     if not buses:
-        return LinkError("no bus runs", "on this machine, of this user", "start one or give a LINK")
+        where = str(directory or default_directory())
+        return LinkError("no bus of this user runs", where, "start one or give a LINK")
     names = [
         f"{one.bus} ({', '.join(way.where for way in one.links) or 'no links'})" for one in buses
     ]

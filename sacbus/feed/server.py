@@ -26,7 +26,7 @@ from sacbus.host import Host
 from sacbus.links.link import Link, Server
 from sacbus.node import Report, ReportKind
 
-__all__ = ["Fed", "FeedServer"]
+__all__ = ["Fed", "FeedServer", "sent_line"]
 
 #: Bytes that wait for one reader at most, beside what the socket holds: some 1 000 lines. Who is
 #: that far behind misses lines, and is told how many.
@@ -197,20 +197,7 @@ class FeedServer:
         )
 
     def _sent(self, sent: Transmission) -> None:
-        size, seed = len(sent.data), self._hosted.bus.medium.seed
-        words, node = self._sender(sent.sender)
-        data, ninth = sent.arrived(0, size, seed), sent.ninth_bits(0, size, seed)
-        hits = tuple(sent.hits or ())
-        self._say(Sent(sent.start, sent.end, sent.lane, words, node, data, hits, ninth))
-
-    def _sender(self, sender: object) -> tuple[str, int | None]:
-        """In words, and the address if it is a node."""
-        if isinstance(sender, Port | LivePort):
-            return sender.name, None
-        for node in self._hosted.bus.nodes:
-            if node is sender:
-                return f"node {node.address}", node.address
-        return "somebody", None
+        self._say(sent_line(sent, self._hosted.bus))
 
     def _say(self, line: Line) -> None:
         """Have a line told to everybody, at the end of this turn of the event loop."""
@@ -285,6 +272,32 @@ class _Client(asyncio.Protocol):
             self._transport.abort()
         else:
             self._transport.close()
+
+
+def sent_line(sent: Transmission, bus: Bus) -> Sent:
+    """What is told of a transmission on this bus that is over."""
+    size, seed = len(sent.data), bus.medium.seed
+    sender, node = _sender(sent.sender, bus)
+    return Sent(
+        sent.start,
+        sent.end,
+        sent.lane,
+        sender,
+        node,
+        sent.arrived(0, size, seed),
+        tuple(sent.hits or ()),
+        sent.ninth_bits(0, size, seed),
+    )
+
+
+def _sender(sender: object, bus: Bus) -> tuple[str, int | None]:
+    """In words, and the address if it is a node."""
+    if isinstance(sender, Port | LivePort):
+        return sender.name, None
+    for node in bus.nodes:
+        if node is sender:
+            return f"node {node.address}", node.address
+    return "somebody", None
 
 
 def _way(link: Link | Server) -> Way:

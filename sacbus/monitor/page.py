@@ -32,9 +32,9 @@ Clock = Callable[[Ns], datetime]
 #: Bytes that a line of text shows of garbage, and of each part of a collision.
 SHOWN: Final = 24
 
-#: Characters of the columns: 99 999 s of time and 9 999 s of silence stay aligned.
+#: Characters of the columns: a day of time and three hours of silence stay aligned.
 _TIME: Final = 12
-_GAP: Final = 12
+_GAP: Final = 14
 _VERDICT: Final = 6
 _NOWHERE: Final = " " * len("255 -> 255")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sacbus.daemon import Configuration, open_bus
-from sacbus.feed import FeedServer, Reached, client, find, running
+from sacbus.feed import FeedServer, Reached, SeveralBuses, client, find, running
 from sacbus.links import LinkError, PtyLink
 from tests.links.rig import until
 
@@ -49,15 +49,18 @@ def test_the_bus_is_found_by_its_link_and_the_others_are_left_alone(runtime: Pat
 
 def test_without_a_link_it_must_be_the_only_one(runtime: Path) -> None:
     async def scene() -> None:
-        with pytest.raises(LinkError, match=r"no bus runs, .*, start one or give a LINK"):
+        with pytest.raises(LinkError) as refused:
             await find(None, runtime)
+        assert str(refused.value) == (
+            f"no bus of this user runs, {runtime}, start one or give a LINK"
+        )
         async with AsyncExitStack() as stack:
             await serve(stack, runtime, "first", runtime / "a")
             feed = await find(None, runtime)
             assert feed is not None
             await feed.close()
             await serve(stack, runtime, "second", runtime / "b")
-            with pytest.raises(LinkError) as refused:
+            with pytest.raises(SeveralBuses) as refused:
                 await find(None, runtime)
             assert str(refused.value) == (
                 f"several buses run, first ({runtime}/a), second ({runtime}/b), "
