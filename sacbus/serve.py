@@ -15,6 +15,7 @@ from functools import partial
 from typing import Final
 
 from sacbus.daemon import Configuration, open_bus
+from sacbus.feed import FeedServer
 from sacbus.notify import notify
 from sacbus.output import output_for
 from sacbus.spare import at_once, in_spare_time
@@ -48,6 +49,10 @@ async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_
     _heed_signals(end)
     async with AsyncExitStack() as stack:
         buses = [await stack.enter_async_context(open_bus(one)) for one in configurations]
+        for bus in buses:
+            feed = FeedServer(bus)
+            await feed.open()
+            stack.callback(feed.close)
         output = output_for(buses, lost, as_json=as_json, show_table=show_table)
         output.ready()
         for bus in buses:
