@@ -1,7 +1,8 @@
 # One command a purpose; CI runs the same ones. `make` alone lists them.
 #
-#   make serve ARGS="--nodes 10-19"       hosts a bus behind $(PTY)
-#   make test ARGS="tests/wire -k crc"    runs the tests
+#   make serve ARGS="--nodes 10-19"            hosts a bus behind $(PTY)
+#   make serve CONFIG=examples/workshop.toml   hosts what a configuration says
+#   make test ARGS="tests/wire -k crc"         runs the tests
 #
 # The virtual environment is made on the first use and brought up to date when pyproject.toml
 # changes. PYTHON=/path/to/python3 names another interpreter.
@@ -11,6 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PYTHON ?=
 PTY ?= /tmp/sacbus
+CONFIG ?=
 ARGS ?=
 # --use-pep517: crcmod is an sdist, and an old pip without wheel builds it in a way it warns about.
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check --use-pep517
@@ -19,7 +21,7 @@ INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check --use-pe
 .PHONY: help serve test coverage check format bench clean
 
 help:
-	@echo "make serve     host a bus behind $(PTY) (ARGS= adds options)"
+	@echo "make serve     host a bus behind $(PTY), or those of CONFIG= (ARGS= adds options)"
 	@echo "make test      run the tests (ARGS= goes to pytest)"
 	@echo "make check     format, lint, types, import arrows, spelling, the examples in the docs"
 	@echo "make coverage  run the tests and show which branches they miss"
@@ -29,7 +31,7 @@ help:
 
 # exec: the shell steps aside, so that Ctrl-C and the exit status are sacbus's own.
 serve: $(VENV)/run
-	@exec $(BIN)/sacbus serve --pty $(PTY) $(ARGS)
+	@exec $(BIN)/sacbus serve $(if $(CONFIG),'$(CONFIG)',--pty $(PTY)) $(ARGS)
 
 test: $(VENV)/dev
 	@$(BIN)/python -m pytest $(ARGS)

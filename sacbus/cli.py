@@ -12,15 +12,22 @@ import json
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from sacbus import __version__
+from sacbus.config.notation import NotationError, addresses, endpoint
+
+if TYPE_CHECKING:
+    from sacbus.daemon import Configuration
 
 __all__ = ["main", "run"]
 
+_T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command has
 
 #: Exit statuses of ``send`` (spec, cli).
@@ -65,24 +72,22 @@ def root(context: click.Context) -> int | None:
 
 
 def _addresses(_ctx: click.Context, _param: click.Parameter, given: str) -> tuple[int, ...]:
-    """``10-19,85``: addresses and ranges of them, in the order given, each once."""
-    found: list[int] = []
-    for part in given.split(","):
-        first, dash, last = (word.strip() for word in part.partition("-"))
-        if not _is_number(first) or (dash and not _is_number(last)):
-            raise click.BadParameter(f"expected addresses like 10-19,85, got {part!r}")
-        low, high = int(first), int(last or first)
-        if not 4 <= low <= high <= 255:
-            raise click.BadParameter(f"expected addresses from 4 to 255, low to high, got {part!r}")
-        found.extend(range(low, high + 1))
-    if len(set(found)) != len(found):
-        twice = next(address for address in found if found.count(address) > 1)
-        raise click.BadParameter(f"expected each address once, got {twice} twice")
-    return tuple(found)
+    """``10-19,85``, or ``none``."""
+    return () if given == "none" else _noted(addresses, given)
 
 
-def _is_number(word: str) -> bool:
-    return word.isascii() and word.isdecimal() and len(word) <= 10
+def _endpoints(
+    _ctx: click.Context, _param: click.Parameter, given: Sequence[str]
+) -> tuple[tuple[str, int], ...]:
+    """Each ``[HOST:]PORT``."""
+    return tuple(_noted(endpoint, one) for one in given)
+
+
+def _noted(read: Callable[[str], _T], text: str) -> _T:
+    try:
+        return read(text)
+    except NotationError as fault:
+        raise click.BadParameter(str(fault)) from fault
 
 
 def _setting(
@@ -97,7 +102,7 @@ def _setting(
         if value.lower() in ("true", "false"):
             settings[name] = value.lower() == "true"
         else:
-            settings[name] = int(value) if _is_number(value) else value
+            settings[name] = int(value) if value.isascii() and value.isdecimal() else value
     return settings
 
 
@@ -111,13 +116,14 @@ _baud = click.option(
 
 
 @root.command()
+@click.argument("config", required=False, metavar="[CONFIG.toml]")
 @click.option(
     "--nodes",
     callback=_addresses,
     default="10-12",
     show_default=True,
     metavar="10-19,85",
-    help="Addresses of the virtual nodes.",
+    help="Addresses of the virtual nodes; none: a line without any.",
 )
 @click.option("--kind", default="sac", show_default=True, help="Their kind (see sacbus kinds).")
 @click.option(
@@ -136,11 +142,39 @@ _baud = click.option(
 )
 @click.option(
     "--pty",
+    "ptys",
+    multiple=True,
     type=click.Path(path_type=Path),
     metavar="PATH",
-    help="Make PATH a stable symlink to the bus's pty; without it, only the pty's own name.",
+    help="A serial port: a pty behind the stable symlink PATH. Without any way in, one pty.",
 )
-@_baud
+@click.option(
+    "--tcp",
+    multiple=True,
+    callback=_endpoints,
+    metavar="[HOST:]PORT",
+    help="A TCP server, bytes as they are (socket:// in pyserial).",
+)
+@click.option(
+    "--rfc2217",
+    multiple=True,
+    callback=_endpoints,
+    metavar="[HOST:]PORT",
+    help="A TCP server of a serial port with its rate, parity and RTS (rfc2217:// in pyserial).",
+)
+@click.option(
+    "--port",
+    "adapters",
+    multiple=True,
+    metavar="/dev/ttyUSB0",
+    help="A real adapter: the nodes on its line and the virtual ones share the bus.",
+)
+@click.option("--rts", is_flag=True, help="Adapters switch their direction by RTS.")
+@click.option(
+    "--baud",
+    type=click.IntRange(300, 4_000_000),
+    help="Line rate. Default: the protocol's own, 38400 for sac.",
+)
 @click.option(
     "--state",
     type=click.Path(path_type=Path, file_okay=False),
@@ -149,6 +183,7 @@ _baud = click.option(
 )
 @click.option("--ephemeral", is_flag=True, help="Keep the EEPROM in memory only.")
 @click.option("--no-pace", is_flag=True, help="Let the line run ahead of the clock.")
+@click.option("--precise", is_flag=True, help="Be punctual to some 10 us; costs a processor.")
 @click.option(
     "--speed",
     type=click.FloatRange(0, min_open=True),
@@ -160,45 +195,105 @@ _baud = click.option(
     "--seed", type=int, default=0, show_default=True, help="For what overlapping bytes turn into."
 )
 @click.option(
-    "--echo", is_flag=True, help="Give a client its own bytes back, as 2-wire adapters do."
+    "--echo",
+    is_flag=True,
+    help="Give programs their own bytes back, as 2-wire adapters do, and expect that of adapters.",
 )
 @click.option("--no-table", is_flag=True, help="No live table on a terminal.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of text.")
 @_verbose
+@click.pass_context
 def serve(
-    pty: Path | None,
+    context: click.Context,
+    /,
+    config: str | None,
+    precise: bool,
+    as_json: bool,
+    no_table: bool,
+    **given: Any,  # noqa: ANN401 (what describes one bus, see _one_bus)
+) -> int:
+    """Host a bus, or all buses of a configuration, and print where to connect. Ctrl-C ends it.
+
+    Servers are open to this machine alone unless a HOST says otherwise: 0.0.0.0:7000.
+
+    \b
+    Example: sacbus serve --nodes 10-19,85 --pty /tmp/sacbus --tcp 7000
+             sacbus serve --port /dev/ttyUSB0 --nodes 30-39
+             sacbus serve workshop.toml
+    """
+    from sacbus.config import ConfigError, examine
+    from sacbus.selector import real_loop
+    from sacbus.serve import serve as run
+
+    if config is None:
+        buses: tuple[Configuration, ...] = (_one_bus(**given),)
+    else:
+        for parameter in context.command.params:
+            name = parameter.name or ""
+            if (
+                name in given.keys() - {"ephemeral"}
+                and context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+            ):
+                raise click.UsageError(
+                    f"{parameter.opts[0]} and a configuration contradict each other, "
+                    f"write it into {config}"
+                )
+        examined = examine(config)
+        for warning in examined.warnings:
+            click.echo(f"warning: {warning}", err=True)
+        if examined.setup is None:
+            raise ConfigError(examined.mistakes)
+        buses = examined.setup.buses
+        precise = precise or examined.setup.precise
+        if given["ephemeral"]:
+            buses = tuple(replace(bus, state=None) for bus in buses)
+    with asyncio.Runner(loop_factory=lambda: real_loop(precise=precise)) as runner:
+        return runner.run(run(buses, as_json=as_json, show_table=not no_table))
+
+
+def _one_bus(
+    *,
+    nodes: tuple[int, ...],
+    kind: str,
+    settings: dict[str, object],
+    receiver: str | None,
+    ptys: tuple[Path, ...],
+    tcp: tuple[tuple[str, int], ...],
+    rfc2217: tuple[tuple[str, int], ...],
+    adapters: tuple[str, ...],
+    rts: bool,
+    echo: bool,
     state: Path | None,
     ephemeral: bool,
     no_pace: bool,
-    no_table: bool,
-    echo: bool,
-    as_json: bool,
-    receiver: str | None,
-    settings: dict[str, object],
     **given: Any,  # noqa: ANN401 (what Configuration takes under the same names)
-) -> int:
-    """Host a bus and print where to connect. Ctrl-C ends it.
-
-    \b
-    Example: sacbus serve --nodes 10-19,85 --pty /tmp/sacbus
-    """
+) -> Configuration:
+    """The bus that options describe."""
     from sacbus.daemon import Configuration
-    from sacbus.links.places import PtyAt
-    from sacbus.serve import serve as run
+    from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt
     from sacbus.state import default_directory
 
     if ephemeral and state is not None:
         raise click.UsageError("--state and --ephemeral contradict each other, leave one out")
+    if rts and not adapters:
+        raise click.UsageError("--rts is about an adapter, name it with --port or leave it out")
     if receiver is not None:
         settings = {**settings, "receiver": receiver}
-    configuration = Configuration(
+    links: list[Place] = [
+        *(PtyAt(path, echo=echo) for path in ptys),
+        *(TcpAt(host, port, echo=echo) for host, port in tcp),
+        *(Rfc2217At(host, port, echo=echo) for host, port in rfc2217),
+        *(AdapterAt(path, rts=rts, echo=echo) for path in adapters),
+    ]
+    return Configuration(
+        nodes=nodes,
+        kind=kind,
         settings=settings,
-        links=(PtyAt(pty, echo=echo),),
+        links=tuple(links) or (PtyAt(echo=echo),),
         state=None if ephemeral else state or default_directory(),
         pace=not no_pace,
         **given,
     )
-    return asyncio.run(run([configuration], as_json=as_json, show_table=not no_table))
 
 
 @root.command()
