@@ -8,7 +8,7 @@ import platform
 from collections.abc import Callable
 from dataclasses import asdict
 
-from benchmarks import bus, kernel, line, pty, wire
+from benchmarks import bus, kernel, lateness, line, pty, wire
 from benchmarks.figure import Figure
 from sacbus.wire import CRC_IS_FAST
 
@@ -18,6 +18,7 @@ BENCHMARKS: dict[str, Callable[[int], list[Figure]]] = {
     "bus": bus.figures,
     "line": line.figures,
     "pty": pty.figures,
+    "lateness": lateness.figures,
 }
 
 
@@ -52,7 +53,7 @@ def row(figure: Figure) -> str:
     if figure.goal is not None:
         goal = f"  goal {figure.goal:,g} ({figure.goal_is}): {'met' if figure.met else 'NOT MET'}"
     return (
-        f"{figure.name:<44}{figure.value:>13,.1f} {figure.unit:<12}"
+        f"{figure.name:<46}{figure.value:>13,.1f} {figure.unit:<12}"
         f"{figure.ratio:>8.3f} x {figure.baseline}{goal}"
     )
 

@@ -12,7 +12,17 @@ import serial
 
 from benchmarks import REQUEST
 
-__all__ = ["Client"]
+__all__ = ["Client", "exchange"]
+
+
+def exchange(port: serial.Serial, times: int) -> float:
+    """Requests, each when the one before is answered; seconds of wall time."""
+    began = time.perf_counter()
+    for _ in range(times):
+        port.write(REQUEST)
+        answer = port.read(4)
+        assert answer == b"\x02\x01\x0a\x06", answer
+    return time.perf_counter() - began
 
 
 class Client:
@@ -42,14 +52,8 @@ class Client:
         self._server.communicate()
 
     def exchange(self, times: int) -> float:
-        """Requests, each when the one before is answered; seconds of wall time."""
-        port = self._port
-        began = time.perf_counter()
-        for _ in range(times):
-            port.write(REQUEST)
-            answer = port.read(4)
-            assert answer == b"\x02\x01\x0a\x06", answer
-        return time.perf_counter() - began
+        """As :func:`exchange`, with this server."""
+        return exchange(self._port, times)
 
     def server_cpu(self) -> float:
         """Processor seconds that the server has used so far."""

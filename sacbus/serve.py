@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import signal
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
@@ -53,6 +54,10 @@ async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_
             feed = FeedServer(bus)
             await feed.open()
             stack.callback(feed.close)
+        # What there is by now stays. To look through all of it for garbage would take 30 ms with
+        # 250 nodes, in which the line stands still; what is made from now on is little.
+        gc.collect()
+        gc.freeze()
         output = output_for(buses, lost, as_json=as_json, show_table=show_table)
         output.ready()
         for bus in buses:
