@@ -136,7 +136,7 @@ WRONG = [
     (["send", "/nonexistent", "10m400"], 1, "no such file.*, /nonexistent, check the path"),
     (["send", "/", "10m400"], 1, "it is a directory"),
     (["send", "/dev/null", "10m400"], 1, "it is not a serial port"),
-    (["send", "socket://h:1", "10m400"], 1, "a URL cannot be opened"),
+    (["send", "socket://h", "10m400"], 1, "a URL without a port number, socket://h, write it as"),
     (["send", "/dev/null", "m400"], 1, "expected an address before the command"),
     (["send", "/dev/null", "300m400"], 1, "node 300: expected an address from 4 to 255"),
 ]

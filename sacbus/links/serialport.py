@@ -44,6 +44,10 @@ __all__ = ["BOUND", "FAULTS", "SerialConnection", "unopened"]
 #: line at 38400 baud.
 BOUND: Final = 65_536
 
+#: Seconds more than a line's own time for the last bytes to leave when a port is closed.
+FINISH_TIMEOUT: Final = 0.2
+
+_BITS: Final = 10  # of a byte: start, eight, stop
 _CHUNK: Final = 65_536  # the most one read may bring; Linux gives 4 kB at a time
 
 _CHECK: Final = "check the path, and whether the bus is running or the adapter plugged in"
@@ -122,6 +126,7 @@ class SerialConnection(asyncio.Protocol):
         self._loop = asyncio.get_running_loop()
         self._hear = hear
         self._lose = lose
+        self._byte_s = _BITS / max(baud, 1)  # one that cannot be had is refused below
         self._failing = False
         self._ended = False
         #: Bytes that the port had not taken when it was lost.
@@ -176,6 +181,15 @@ class SerialConnection(asyncio.Protocol):
             self._transport.abort()
         self.port.close()
         return unwritten
+
+    async def finish(self) -> None:
+        """Let what was written go out, for as long as that takes the line, and close."""
+        patience = self._loop.time() + self.unsent * self._byte_s + FINISH_TIMEOUT
+        # No system tells when it is done, but by a call that waits for it.
+        while self.unsent and self._loop.time() < patience:  # noqa: ASYNC110
+            await asyncio.sleep(self._byte_s)
+        self.close()
+        await asyncio.sleep(0)  # the transport ends in a callback of its own
 
     def data_received(self, data: bytes) -> None:
         """asyncio's: bytes have come."""

@@ -325,7 +325,7 @@ def test_a_line_is_had_by_one_alone() -> None:
         ("/nonexistent/port", "no such file"),
         ("/", "it is a directory"),
         ("/dev/null", "it is not a serial port"),
-        ("socket://localhost:1", "a URL cannot be opened"),
+        ("socket://localhost:1", "connection refused"),
     ],
 )
 def test_a_link_that_cannot_be_had_is_told_in_one_line(link: str, what: str) -> None:
