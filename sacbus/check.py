@@ -41,7 +41,9 @@ def as_text(examined: Examined) -> Iterator[str]:
             bus.every_node, key=lambda node: (node.kind, node.settings)
         ):
             given = "".join(f", {name} = {shown(value)}" for name, value in settings.items())
-            yield f"  nodes {ranges(node.address for node in alike)}: {kind}{given}"
+            addresses = [node.address for node in alike]
+            word = "node" if len(addresses) == 1 else "nodes"
+            yield f"  {word} {ranges(addresses)}: {kind}{given}"
         for place in bus.links:
             yield f"  {_KINDS[type(place)]} {_where(place)}".rstrip()
         yield f"  state {'kept in memory only' if bus.state is None else bus.state / bus.name}"

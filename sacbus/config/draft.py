@@ -7,6 +7,7 @@ at here (clashes.py). Where something is wrong, its place in the draft stays emp
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +27,8 @@ __all__ = ["BusDraft", "Draft", "LinkDraft", "NodeDraft", "draft"]
 
 _KIND: Final = next(key for key in NODE if key.name == "kind")
 _PROTOCOL: Final = next(key for key in BUS if key.name == "protocol")
+#: A SettingError that names its setting, as those of node.py do.
+_ABOUT: Final = re.compile(r"setting '(\w+)': (.*)")
 _DEFAULT_KIND: Final = str(_KIND.default)
 
 
@@ -144,11 +147,16 @@ class _Reader:
             self._findings, path, content, (*NODE, *settings), whole=kind is not None
         )
         given = {key.name: table.values[key.name] for key in settings if key.name in table.values}
-        if kind is not None:
+        if kind is not None and not table.unsure:
             try:
                 settings_from(kind.settings, given)
             except ValueError as fault:  # what a kind has against settings that fit one by one
-                self._findings.add(path, " ".join(str(fault).split()), "correct it")
+                text = " ".join(str(fault).split())
+                hit = _ABOUT.fullmatch(text)
+                if hit and hit[1] in given:
+                    self._findings.add((*path, hit[1]), hit[2], "correct it")
+                else:
+                    self._findings.add(path, text, "correct it")
         return NodeDraft(table, kind, self._addresses(table), given)
 
     def _kind_of(self, path: lines.Path, content: Mapping[str, object]) -> NodeKind | None:

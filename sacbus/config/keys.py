@@ -156,7 +156,7 @@ TOP: Final = (
     ),
     _flag(
         "precise",
-        "wake more precisely, at the price of processor time",
+        "be punctual to some 10 µs; costs a processor",
         default=False,
     ),
     Key("bus", "one [[bus]] at least", _is_tables, "a bus", required=True),
