@@ -310,13 +310,13 @@ def _one_bus(
 def send(link: str, line: str, baud: int, accept_duplicates: bool, as_json: bool) -> int:
     """Send LINE as mother and wait for the ACK. LINE begins with an address: 85m3000a2d1.
 
-    LINK is the path of a serial port or of a bus's pty. Address 0 is everybody; nobody answers it.
-    Status: 0 ACK, 3 NAK, 4 no answer, 5 unknown outcome (silence after a command that must not run
-    twice).
+    LINK is the path of a serial port or of a bus's pty, socket://host:port or rfc2217://host:port.
+    Address 0 is everybody; nobody answers it. Status: 0 ACK, 3 NAK, 4 no answer, 5 unknown outcome
+    (silence after a command that must not run twice).
 
     \b
     Example: sacbus send /tmp/sacbus 10m400v120
-             sacbus send /tmp/sacbus 0S
+             sacbus send socket://127.0.0.1:7000 0S
     """
     from sacbus.mother import NoAnswer, Refused, UnknownOutcome, addressed_line
 

@@ -233,6 +233,14 @@ def test_a_broadcast_is_sent_and_nobody_answers(capsys: Captured, bus: Sacbus) -
 
 
 @pytest.mark.slow
+def test_send_goes_over_a_network_as_well(capsys: Captured) -> None:
+    with served("--ephemeral", "--nodes", "10", "--tcp", "0", "--rfc2217", "0") as bus:
+        for link in bus.ready["links"]:
+            assert run(["send", link["url"], "10m400"]) == 0
+            assert capsys.readouterr().out.startswith("ACK from node 10, ")
+
+
+@pytest.mark.slow
 def test_no_answer_to_what_was_repeated_is_status_4(capsys: Captured, bus: Sacbus) -> None:
     assert run(["send", bus.link, "99V100"]) == 4
     assert the_error(capsys).startswith("node 99: 'V100' sent 3 times, last answer silence")

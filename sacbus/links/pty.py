@@ -29,9 +29,15 @@ from typing import Final
 
 from .errors import LinkError
 from .link import LinkCounters
-from .pair import PtyPair
 from .presence import Presence
-from .symlink import Symlink
+
+try:
+    from .pair import PtyPair
+    from .symlink import Symlink
+except ImportError:  # fcntl and termios, on Windows
+    _HERE = False
+else:
+    _HERE = True
 
 __all__ = ["PtyLink"]
 
@@ -40,7 +46,8 @@ class PtyLink:
     """A raw pty, behind a stable symlink if a path is given.
 
     `baud` is the bus's rate, which the line is set to when no client has set another. `presence`
-    may be shared between links of one event loop; by default each link has its own.
+    may be shared between links of one event loop; by default each link has its own. LinkError where
+    the system has no ptys, as Windows has none.
     """
 
     kind: Final = "pty"
@@ -52,6 +59,10 @@ class PtyLink:
         baud: int = 38_400,
         presence: Presence | None = None,
     ) -> None:
+        if not _HERE:
+            raise LinkError(
+                "this system has no ptys", str(path or "pty"), "use TCP or RFC 2217 in its place"
+            )
         self.counters = LinkCounters()
         self._baud = baud
         self._presence = Presence() if presence is None else presence

@@ -1,7 +1,7 @@
 """Mother for coroutines: connect to a line, send a command, get an answer or a typed error.
 
 Owns the meeting of the transactions (``caller.py``) with asyncio and with a link; no rule of its
-own. The same class drives a bus hosted in this process and a serial port.
+own. The same class drives a bus hosted in this process and a line outside.
 """
 
 from __future__ import annotations
@@ -72,10 +72,11 @@ class Mother:
     @classmethod
     @asynccontextmanager
     async def connect(cls, link: str, *, baud: int = 38_400) -> AsyncIterator[Mother]:
-        """Mother on a serial port or pty, for an ``async with`` block.
+        """Mother on a line, for an ``async with`` block.
 
-        ``link`` is a path. Raises :class:`~sacbus.links.LinkError` when it cannot be opened; a line
-        lost later raises :class:`LineLost` in every call, and so does one after the block.
+        ``link`` is the path of a serial port or pty, ``socket://host:port`` or
+        ``rfc2217://host:port``. Raises :class:`~sacbus.links.LinkError` when it cannot be opened; a
+        line lost later raises :class:`LineLost` in every call, and so does one after the block.
         """
         clock = LoopClock(asyncio.get_running_loop())
         async with open_line(link, baud) as line:
