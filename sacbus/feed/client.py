@@ -20,8 +20,8 @@ __all__ = ["Feed", "SeveralBuses", "find", "running"]
 #: Seconds for a daemon to say hello; one that takes longer is stuck.
 PATIENCE: Final = 3.0
 
-#: The longest line that is read, in bytes: a transmission of 256 KiB, which nothing sends at once.
-LONGEST: Final = 1024 * 1024
+#: The longest line that is read, in bytes: a transmission of 128 KiB, which nothing sends at once.
+LONGEST: Final = 256 * 1024
 
 
 class SeveralBuses(LinkError):

@@ -70,6 +70,10 @@ async def monitor(wanted: Wanted) -> int:
     return ended.result()
 
 
+class _NotYet(Exception):
+    """There is still nothing that we may open."""
+
+
 class _Session:
     """Everything from the first look for the line on."""
 
@@ -89,6 +93,9 @@ class _Session:
                 why = await self._look(waited=bool(told))
             except SeveralBuses:
                 raise
+            except _NotYet:
+                await asyncio.sleep(RETRY)
+                continue
             except LinkError as fault:
                 if not self._wanted.wait:
                     raise
@@ -117,11 +124,10 @@ class _Session:
     async def _look_again(self, link: str) -> Feed | None:
         """The feed of a bus that may be just starting: its port is there before its feed is.
 
-        To open that port would take bytes away from the program that it is meant for. LinkError
-        while there is nothing that we may open.
+        To open that port would take bytes away from the program that it is meant for.
         """
         if self._fed or not _may_be_there(link):
-            raise LinkError("it is not there", link, "start it")
+            raise _NotYet
         await asyncio.sleep(RETRY)
         return await find(link)
 
