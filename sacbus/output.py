@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from sacbus import __version__
+from sacbus.config.notation import ranges
 from sacbus.daemon import HostedBus
 from sacbus.kernel import MS, SECOND, US, Ns
 from sacbus.lateness import Lateness
@@ -261,7 +262,7 @@ def _population(bus: HostedBus) -> str:
     for node in bus.configuration.every_node:
         by_kind.setdefault(node.kind, []).append(node.address)
     kinds = [
-        f"{len(nodes)} {kind} node{'s' if len(nodes) != 1 else ''} ({_ranges(nodes)})"
+        f"{len(nodes)} {kind} node{'s' if len(nodes) != 1 else ''} ({ranges(nodes)})"
         for kind, nodes in by_kind.items()
     ]
     return f"{', '.join(kinds) or 'no nodes'} at {bus.bus.rate.baud} baud"
@@ -323,14 +324,3 @@ def _late(lateness: Lateness) -> str:
 def _printable(text: str) -> str:
     """``text`` without control characters: what nodes are sent may be anything, escapes too."""
     return "".join(one if one.isprintable() else f"\\x{ord(one):02x}" for one in text)
-
-
-def _ranges(addresses: Sequence[int]) -> str:
-    """``10-12, 85`` for (10, 11, 12, 85)."""
-    runs: list[list[int]] = []
-    for address in addresses:
-        if runs and runs[-1][1] == address - 1:
-            runs[-1][1] = address
-        else:
-            runs.append([address, address])
-    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in runs)

@@ -213,7 +213,7 @@ def test_without_a_terminal_there_are_plain_lines_and_no_control_characters() ->
     with started("serve", "--ephemeral", "--nodes", "10,12-14") as sacbus:
         text = sacbus.read_until(lambda text: "Ctrl-C ends it\n" in text)
         first, connect, _ = text.splitlines()
-        assert first.endswith(": 4 sac nodes (10, 12-14) at 38400 baud")
+        assert first.endswith(": 4 sac nodes (10,12-14) at 38400 baud")
         link = connect.removeprefix("connect to ")
         exchange(link, encode(10, 1, b" \x1b[2J bell \x07"), ACK_10)
         sacbus.read_until(lambda text: "bell" in text)
