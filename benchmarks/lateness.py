@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 
 import serial
 
-from benchmarks.client import exchange
+from benchmarks.client import Server, exchange
 from benchmarks.figure import Figure
 from sacbus.wire import encode
 
@@ -88,18 +88,10 @@ def figures(rounds: int) -> list[Figure]:
 
 
 def _bare() -> tuple[float, float]:
-    server = subprocess.Popen(
-        [sys.executable, "-m", "benchmarks.server", "select"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    with server:
-        assert server.stdout is not None
-        with serial.Serial(server.stdout.readline().strip(), 38_400, timeout=5) as port:
+    with Server("select") as server:
+        with serial.Serial(server.where, 38_400, timeout=5) as port:
             exchange(port, EXCHANGES)
-        told, _ = server.communicate()
-    p50, p99 = map(float, told.split())
+        p50, p99 = map(float, server.end().split())
     return p50, p99
 
 

@@ -5,9 +5,7 @@ Processor time of the server process alone; the same client and the same bytes f
 
 from __future__ import annotations
 
-import statistics
-
-from benchmarks.client import Client
+from benchmarks.client import Client, cpu_each
 from benchmarks.figure import Figure
 
 EXCHANGES = 2_000
@@ -15,15 +13,9 @@ EXCHANGES = 2_000
 
 def figures(rounds: int) -> list[Figure]:
     """Server CPU per exchange without pacing; the goal is three times the bare echo's."""
-    bus: list[float] = []
-    echo: list[float] = []
-    with Client("unpaced") as ours, Client("echo") as bare:
-        for _ in range(rounds):
-            for client, costs in ((ours, bus), (bare, echo)):
-                before = client.server_cpu()
-                client.exchange(EXCHANGES)
-                costs.append((client.server_cpu() - before) / EXCHANGES)
-    took, baseline = statistics.median(bus), statistics.median(echo)
+    with Client("bus-unpaced") as ours, Client("pty-echo") as bare:
+        sides = [(client.server, client.exchange) for client in (ours, bare)]
+        took, baseline = cpu_each(sides, EXCHANGES, rounds)
     return [
         Figure(
             "server CPU per request and ACK, pty, unpaced",

@@ -1,78 +1,53 @@
-"""The server processes that the pty benchmarks talk to: ``python -m benchmarks.server KIND``.
+"""The server processes that benchmarks talk to: ``python -m benchmarks.server KIND [PATH]``.
 
-KIND is ``paced`` or ``unpaced`` (sacbus) or one of the least that any server must do: ``echo``, a
-pty whose requests are answered with four bytes from an ``add_reader`` callback, and ``select``, one
-that answers in the line's time from a loop of bare ``select`` calls. Prints the port's path; each
-line on its standard input is answered with the processor time used so far, in seconds. ``select``
-prints how late its calls came back instead, p50 and p99 in us, when its standard input ends.
+KIND is ``bus`` (paced), ``bus-unpaced``, ``tcp`` and ``tcp-many`` (unpaced), ``adapter`` (at PATH),
+or the least that any server must do in its place: ``pty-echo``, ``tcp-echo``, ``serial-echo`` (at
+PATH), ``select``. Prints where to connect; each line on its standard input is answered with the
+processor time used so far, in seconds.
 """
 
 from __future__ import annotations
 
 import asyncio
 import os
-import pty
-import select
 import sys
 import time
-import tty
+from collections.abc import Awaitable, Callable
 
-from benchmarks import REQUEST
+from benchmarks import bare
 from sacbus.daemon import Configuration, open_bus
-from sacbus.kernel import SECOND, LineRate
-from sacbus.links.places import PtyAt
-from sacbus.wire import ack
-from sacbus.wire.times import turnaround
+from sacbus.links.places import AdapterAt, PtyAt, TcpAt
+from sacbus.selector import real_loop
 
-ANSWER = ack(1, 10)
+#: Where 64 nodes sit, so that each of 64 requests in a row is another node's. On two lanes, since
+#: on one their answers would collide with the requests behind them.
+MANY = tuple(range(10, 74))
 
-
-async def serve_echo() -> None:
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    os.set_blocking(master, False)
-    got = 0
-
-    def read() -> None:
-        nonlocal got
-        got += len(os.read(master, 65_536))
-        while got >= len(REQUEST):
-            got -= len(REQUEST)
-            os.write(master, ANSWER)
-
-    asyncio.get_running_loop().add_reader(master, read)
-    print(os.ttyname(slave), flush=True)
-    await _tell_time()
+BUSES: dict[str, Callable[[str], Configuration]] = {
+    "bus": lambda _: Configuration(links=(PtyAt(),)),
+    "bus-unpaced": lambda _: Configuration(links=(PtyAt(),), pace=False),
+    "tcp": lambda _: Configuration(links=(TcpAt("127.0.0.1", 0),), pace=False),
+    "tcp-many": lambda _: Configuration(
+        nodes=MANY, lanes=2, links=(TcpAt("127.0.0.1", 0),), pace=False
+    ),
+    "adapter": lambda path: Configuration(links=(AdapterAt(path),)),
+}
+BARE: dict[str, Callable[[str], Awaitable[object]]] = {
+    "pty-echo": lambda _: bare.pty_echo(),
+    "tcp-echo": lambda _: bare.tcp_echo(),
+    "serial-echo": bare.serial_echo,
+}
 
 
-def serve_select() -> None:
-    master, slave = pty.openpty()
-    tty.setraw(slave)
-    rate = LineRate()
-    packet, answer = len(REQUEST), len(ANSWER)
-    ack = rate.span(packet) + turnaround(packet - 6, nul_follows=True)
-    # What an exchange has to wait for: the packet's end, the answer's start, and its end.
-    waits = [ns / SECOND for ns in (rate.span(packet), ack, ack + rate.span(answer))]
-    late: list[float] = []
-    print(os.ttyname(slave), flush=True)
-    while 0 not in (ready := select.select([master, 0], [], [])[0]):
-        came = time.monotonic()
-        assert ready == [master]
-        assert len(os.read(master, 65_536)) == packet
-        for wait in waits:
-            while (left := came + wait - time.monotonic()) > 0:
-                select.select([0], [], [], left)
-            late.append(-left)
-        os.write(master, ANSWER)
-    late.sort()
-    print(late[len(late) // 2] * 1e6, late[len(late) * 99 // 100] * 1e6)
-
-
-async def serve_bus(*, pace: bool) -> None:
-    configuration = Configuration(links=(PtyAt(),), pace=pace)
+async def serve_bus(configuration: Configuration) -> None:
     async with open_bus(configuration) as bus:
         print(bus.links[0].where, flush=True)
         await _tell_time()
+
+
+async def serve_bare(serving: Awaitable[object]) -> None:
+    await serving
+    await _tell_time()
 
 
 async def _tell_time() -> None:
@@ -91,11 +66,15 @@ async def _tell_time() -> None:
 
 
 def main(argv: list[str]) -> int:
-    kind = argv[0]
+    kind, path = argv[0], "".join(argv[1:])
     if kind == "select":
-        serve_select()
-        return 0
-    asyncio.run(serve_echo() if kind == "echo" else serve_bus(pace=kind == "paced"))
+        bare.select_echo()
+    elif kind in BARE:
+        asyncio.run(serve_bare(BARE[kind](path)))
+    else:
+        # The loop that ``sacbus serve`` runs in.
+        with asyncio.Runner(loop_factory=real_loop) as runner:
+            runner.run(serve_bus(BUSES[kind](path)))
     return 0
 
 
