@@ -104,8 +104,7 @@ class TcpLink(asyncio.BufferedProtocol):
             transport.write(data)
 
     def hold(self, *, held: bool) -> None:
-        # What has shut its writing side says nothing more; resuming would only read that again.
-        if self._transport is None or self._ending is not None:
+        if self._transport is None:
             return
         if held:
             self._transport.pause_reading()

@@ -172,6 +172,7 @@ async def test_a_slow_reader_loses_the_rest_and_nothing_else(rig: Rig) -> None:
     rig.link.send(b"and on")
     await until(lambda: ear.has_bytes(held + 6))
     assert ear.heard.endswith(b"and on")
+    assert counters.bytes_out == held + 6
 
 
 @pytest.mark.slow

@@ -26,6 +26,10 @@ pytestmark = pytest.mark.asyncio
 
 NOBODY = 65_534
 
+# Python loads its codec of host names when it is first used, and for good or not at all: not in a
+# test that lets it have no file.
+"".encode("idna")
+
 KINDS: dict[str, tuple[type[TcpServer | Rfc2217Server], type[TcpProgram]]] = {
     "tcp": (TcpServer, TcpProgram),
     "rfc2217": (Rfc2217Server, TelnetProgram),
@@ -160,6 +164,19 @@ async def test_what_was_kept_for_a_program_that_leaves_is_dropped_and_counted(
     # As much as the transport may keep; the system's own buffers tell nobody.
     assert link.counters.dropped_out - dropped > tcp.BOUND - 2000
     assert rig.counters.dropped_out == link.counters.dropped_out
+
+
+async def test_what_was_kept_and_has_gone_out_is_not_counted_as_dropped(rig: ServerRig) -> None:
+    client = await rig.client_is_known()
+    counters = rig.link.counters
+    while not counters.dropped_out:
+        rig.link.send(bytes(1000))
+    dropped = counters.dropped_out
+    ear = Ear(client)
+    await until(lambda: ear.has_bytes(counters.bytes_out))
+    await rig.leave(client)
+    await until(lambda: rig.gone)
+    assert counters.dropped_out - dropped < 1000
 
 
 async def test_what_is_kept_when_the_server_closes_is_counted_too(rig: ServerRig) -> None:
@@ -334,6 +351,8 @@ async def test_a_fault_in_letting_one_in_ends_that_one_alone(kind: str) -> None:
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 async def test_who_comes_while_the_server_closes_finds_it_closed(kind: str) -> None:
     server, program = KINDS[kind]
+    faults: list[object] = []
+    asyncio.get_running_loop().set_exception_handler(lambda _loop, fault: faults.append(fault))
     for turns in range(4):
         it = server()
         came: list[Link] = []
@@ -353,6 +372,7 @@ async def test_who_comes_while_the_server_closes_finds_it_closed(kind: str) -> N
             await until(lambda: ear.has_bytes(1000))
         assert len(came) == seen
         client.close()
+    assert faults == []
 
 
 async def test_the_port_is_the_system_s_choice_until_one_is_given(
@@ -510,7 +530,6 @@ async def test_a_link_tells_in_its_place_which_program_it_is(rig: ServerRig) -> 
 async def test_a_system_without_a_socket_to_give_is_told_in_one_line(
     server: type[TcpServer | Rfc2217Server],
 ) -> None:
-    "".encode("idna")  # Python loads the codec of host names on first use, which needs a file
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (3, hard))
     try:

@@ -76,29 +76,60 @@ async def test_what_waits_for_a_slow_reader_stays_within_the_bound(rig: ServerRi
     assert link.counters.dropped_out > 0
 
 
-@pytest.mark.parametrize("other", ["192.0.2.1", "127.0.0.1"])
-async def test_a_name_of_several_addresses_is_served_at_those_that_can_be_had(
-    monkeypatch: pytest.MonkeyPatch, other: str
-) -> None:
-    taken = TcpServer()
-    await taken.open(lambda link: lambda: None)
-    port = int(taken.where.rsplit(":", 1)[1])
+#: Not of this machine; one that is taken; two that are free.
+FOREIGN, TAKEN, FREE, SECOND = "192.0.2.1", "127.0.0.1", "127.0.0.3", "127.0.0.4"
 
-    async def resolve(*_arguments: object, **_settings: object) -> list[Any]:
+
+@pytest_asyncio.fixture
+async def port() -> AsyncIterator[int]:
+    """A port that is taken, at one address."""
+    taken = TcpServer(TAKEN)
+    await taken.open(lambda link: lambda: None)
+    yield int(taken.where.rsplit(":", 1)[1])
+    taken.close()
+
+
+def stand_for(addresses: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have all names stand for these addresses."""
+
+    async def resolve(_host: str, port: int, **_settings: object) -> list[Any]:
         kind = (socket.AF_INET, socket.SOCK_STREAM, 6, "")
-        return [(*kind, (address, port)) for address in (other, "127.0.0.3")]
+        return [(*kind, (address, port)) for address in addresses]
 
     monkeypatch.setattr(asyncio.get_running_loop(), "getaddrinfo", resolve)
+
+
+@pytest.mark.parametrize(
+    "addresses", [[FREE], [FREE, SECOND], [FOREIGN, FREE], [FREE, FOREIGN], [FREE, FREE]]
+)
+async def test_a_name_is_served_at_those_of_its_addresses_that_can_be_had(
+    addresses: list[str], port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_for(addresses, monkeypatch)
     server = TcpServer("several.example", port)
-    if other == "127.0.0.1":
-        with pytest.raises(LinkError, match=r"the port is taken, socket://several.example:"):
-            await server.open(lambda link: lambda: None)
-    else:
-        rig = ServerRig(server, lambda _url: TcpProgram(f"socket://127.0.0.3:{port}"))
-        await rig.start()
-        await rig.client_is_known()
-        rig.close()
-    taken.close()
+    await server.open(lambda link: lambda: None)
+    for address in {*addresses} - {FOREIGN}:
+        TcpProgram(f"socket://{address}:{port}").close()
+    server.close()
+
+
+@pytest.mark.parametrize("addresses", [[TAKEN, FREE], [FREE, TAKEN], [FREE, FOREIGN, TAKEN]])
+async def test_a_name_is_not_served_by_half_when_somebody_else_has_the_port(
+    addresses: list[str], port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_for(addresses, monkeypatch)
+    with pytest.raises(LinkError, match=r"the port is taken, socket://several.example:"):
+        await TcpServer("several.example", port).open(lambda link: lambda: None)
+
+
+async def test_a_name_is_served_at_one_address_when_the_system_chooses_the_port(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stand_for([FREE, SECOND], monkeypatch)
+    server = TcpServer("several.example")
+    await server.open(lambda link: lambda: None)
+    assert len(server._listeners) == 1
+    server.close()
 
 
 async def test_opening_that_is_cancelled_leaves_nothing_open() -> None:

@@ -223,8 +223,15 @@ def test_a_suboption_without_an_end_is_not_kept_for_ever_and_its_end_is_found() 
     assert talk.answer == sub(102, b"\x07")
 
 
+def test_the_end_of_a_suboption_too_long_may_come_in_two_parts() -> None:
+    talk = Talk().says(IAC + SB + bytes(LONGEST + 1) + IAC, SE + b"heard")
+    assert talk.data == b"heard"
+
+
 def test_another_command_cuts_a_suboption_off() -> None:
-    talk = Talk().says(IAC + SB + COM_PORT + b"\x01" + IAC + DO + b"\x05" + b"data")
+    nine_thousand_six_hundred = b"\x01\x00\x00\x25\x80"
+    talk = Talk().says(IAC + SB + COM_PORT + nine_thousand_six_hundred)
+    talk.says(IAC + DO + b"\x05" + b"data")
     assert (talk.data, talk.answer) == (b"data", IAC + WONT + b"\x05")
     assert talk.telnet.port.baudrate == 38_400
 
