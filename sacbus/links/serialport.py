@@ -101,8 +101,10 @@ class _Port(serial.Serial):
 
         def close(self) -> None:
             """Close, throwing away what the system has not sent: it would wait for that."""
-            if self.is_open:
-                with contextlib.suppress(termios.error):
+            with contextlib.suppress(OSError, termios.error):
+                # Not for nothing: of a pty, which never makes anyone wait, that throws away what
+                # the other end has not read yet.
+                if self.is_open and self.out_waiting:
                     termios.tcflush(self.fileno(), termios.TCOFLUSH)
             super().close()
 
