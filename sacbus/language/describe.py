@@ -199,7 +199,8 @@ def _system(command: SystemCommand) -> str:
         case SetParameter(parameter):
             return f"store {parameter.title} = {command.entry()[1:]}"
         case MapPins(exponent, pins):
-            return f"store the pins {pins:03b} for 1/{1 << exponent} steps"
+            step = f"1/{1 << exponent}" if exponent else "full"
+            return f"store the pins {pins:03b} for {step} steps"
         case ShowMemory():
             return "show the EEPROM"
         case StepMode(full_step):
@@ -207,7 +208,7 @@ def _system(command: SystemCommand) -> str:
         case ToggleStepMode():
             return "toggle between full steps and pulses"
         case SendCrcs(on):
-            return f"send {'a CRC' if on else 'no CRCs'} in this session"
+            return f"send {'CRCs' if on else 'no CRCs'} in this session"
         case SendAcks(on):
             return f"send {'ACK and NAK' if on else 'neither ACK nor NAK'} in this session"
         case Ramp(linear):

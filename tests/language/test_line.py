@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from sacbus.language import BARE, Remark
-from sacbus.language.line import Line, short
+from sacbus.language.line import Line, low_byte, short
 
 
 def test_a_remark_reads_as_one_sentence() -> None:
@@ -54,3 +54,23 @@ def test_hundredths_are_bare_without_a_number() -> None:
 def test_what_is_quoted_is_cut_beyond_twenty_characters() -> None:
     assert short("1" * 20) == "1" * 20
     assert short("1" * 21) == "1" * 17 + "..."
+
+
+def test_a_number_out_of_bounds_is_refused_with_them() -> None:
+    line = Line("x31")
+    assert line.within(1, "a place", 0, 31) == (31, 3)
+    assert line.within(1, "a place", 0, 30) is None
+    assert line.remarks == [Remark(2, "a place, 0 to 30", "31", "the line does nothing")]
+
+
+def test_a_position_is_1_to_30_and_its_column_is_kept() -> None:
+    line = Line("q030m0")
+    assert line.position(1) == (30, 4)
+    assert line.columns == {"position": 2}
+    assert line.position(5) is None
+    assert line.columns == {"position": 2}
+
+
+def test_the_low_byte_of_a_number_of_any_length() -> None:
+    assert [low_byte(digits) for digits in ("0", "255", "256", "341")] == [0, 255, 0, 85]
+    assert low_byte("9" * 9000) == (10**9000 - 1) % 256

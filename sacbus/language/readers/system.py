@@ -8,7 +8,7 @@ Appendix C; spec, "System commands".
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Final, assert_never
 
 from sacbus.language.commands import (
     BARE,
@@ -186,6 +186,8 @@ def _whole(line: Line, at: int, parameter: Parameter) -> tuple[int | None, int] 
             value = low_byte(digits)
         case Beyond.IGNORED:
             value = None
+        case _:
+            assert_never(parameter.beyond)
     consequence = "the value is ignored" if value is None else f"{value} is used"
     line.remark(at, f"{title}, at most {largest}", short(digits), consequence)
     return value, after
