@@ -33,9 +33,10 @@ __all__ = ["BOUND", "LINGER", "TcpLink", "TcpServer"]
 #: the order of what a pty holds, and 17 s of a line at 38400 baud.
 BOUND: Final = 65_536
 
-#: The most one read may bring. One buffer does for all programs of a server: what it held is copied
-#: out before anybody else gets to read.
-CHUNK: Final = 65_536
+#: The most one read may bring, as of a pty: a line is in no hurry for more, and one program's flood
+#: delays the others by no more than it takes to look at so much. One buffer does for all programs
+#: of a server, since what it held is copied out before anybody else gets to read.
+CHUNK: Final = 4_096
 
 #: Seconds without a byte in either direction after which a program that writes no more is taken to
 #: have left. A node answers within 1 ms of the end of a packet.
