@@ -101,14 +101,17 @@ class Line:
 
 
 @asynccontextmanager
-async def open_line(link: str, baud: int) -> AsyncIterator[Line]:
+async def open_line(link: str, baud: int, *, rts: bool = True) -> AsyncIterator[Line]:
     """Open LINK: the path of a serial port or pty, ``socket://`` or ``rfc2217://host:port``.
 
     A path is opened 8N1, raw, for oneself alone; so is a port behind RFC 2217, as far as its server
     goes. TCP has no rate. Closed at the end. LinkError in one line when it cannot be had.
+
+    ``rts``: the level of a port's RTS. Who only listens leaves it low, since on many RS485 adapters
+    it switches the driver on.
     """
     line = Line(link)
-    wire = await _opener(link)(link, baud, line)
+    wire = await _opener(link)(link, baud, line, rts)
     line.connect(wire)
     try:
         yield line
@@ -117,7 +120,7 @@ async def open_line(link: str, baud: int) -> AsyncIterator[Line]:
         await wire.finish()
 
 
-Opener = Callable[[str, int, Line], Awaitable[Wire]]
+Opener = Callable[[str, int, Line, bool], Awaitable[Wire]]
 
 
 def _opener(link: str) -> Opener:
@@ -168,24 +171,24 @@ def unreachable(link: str, host: str, fault: BaseException) -> LinkError:
     return LinkError(f"cannot connect ({why})", link, "check host and port, and the network")
 
 
-async def _open_port(link: str, baud: int, line: Line) -> Wire:
+async def _open_port(link: str, baud: int, line: Line, rts: bool) -> Wire:
     try:
         from .serialport import SerialConnection  # noqa: PLC0415 (see the headline)
     except ImportError as fault:
         raise LinkError("this system has no serial ports", link, _FORMS) from fault
-    return SerialConnection(link, baud, line.hear, line.lose)
+    return SerialConnection(link, baud, line.hear, line.lose, rts=rts)
 
 
-async def _open_remote(link: str, baud: int, line: Line) -> Wire:
+async def _open_remote(link: str, baud: int, line: Line, rts: bool) -> Wire:
     from .remote import RemotePort  # noqa: PLC0415 (see the headline)
 
     host, _, parts = endpoint(link)
-    port = RemotePort(parts.geturl(), host, baud, line.hear, line.lose)
+    port = RemotePort(parts.geturl(), host, baud, line.hear, line.lose, rts=rts)
     await port.open()
     return port
 
 
-async def _open_socket(link: str, _baud: int, line: Line) -> Wire:
+async def _open_socket(link: str, _baud: int, line: Line, _rts: bool) -> Wire:
     host, port, parts = endpoint(link)
     if parts.query:
         raise LinkError("a malformed URL", link, "write it as socket://host:port")

@@ -122,7 +122,8 @@ class _Port(rfc2217.Serial):
 class RemotePort:
     """The port behind ``url`` at ``baud``, 8N1; to be opened.
 
-    ``hear`` gets what comes, ``lose`` why it is gone: once.
+    ``hear`` gets what comes, ``lose`` why it is gone: once. ``rts`` is the level that its RTS is
+    asked to have.
     """
 
     def __init__(
@@ -132,6 +133,8 @@ class RemotePort:
         baud: int,
         hear: Callable[[bytes], None],
         lose: Callable[[str], None],
+        *,
+        rts: bool = True,
     ) -> None:
         self._url = url
         self._host = host
@@ -144,6 +147,7 @@ class RemotePort:
         self._heard = _Heard(lambda: self._on_loop(self._attend))
         self._port = _Port(self._heard)
         self._port.baudrate = baud
+        self._port.rts = rts
         self._port.port = url
         #: What is to be written, and whether anything more will be; both under the condition.
         self._work = threading.Condition()

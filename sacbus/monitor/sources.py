@@ -88,7 +88,7 @@ async def watch_link(link: str, wanted: Wanted, output: Output, summary: Summary
     gone: asyncio.Future[str] = loop.create_future()
     timer: asyncio.TimerHandle | None = None
     before = summary.elapsed
-    async with open_line(link, rate.baud) as line:
+    async with open_line(link, rate.baud, rts=False) as line:
         start = loop.time()
         output.clock.set(0, time.time_ns())
         output.begin(*_of_link(link, protocol, rate))

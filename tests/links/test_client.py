@@ -16,6 +16,7 @@ import serial
 from serial.urlhandler import protocol_loop
 
 from sacbus.links import Line, LinkError, client, open_line
+from sacbus.links.serialport import SerialConnection
 from tests.links.peers import OPENED, Far, PortManagerPeer, TcpPeer, free_port, of_pty
 from tests.links.rig import until
 
@@ -229,6 +230,17 @@ async def test_a_port_is_had_by_one_alone() -> None:
         with pytest.raises(serial.SerialException) as refused:
             serial.Serial(far.link, exclusive=True)
         assert refused.value.errno == errno.EWOULDBLOCK
+
+
+@pytest.mark.parametrize("rts", [False, True])
+async def test_rts_is_as_asked_for_from_the_start(rts: bool) -> None:
+    # A pty has none; that the port would set it is all that can be seen there.
+    async with of_pty() as far, open_line(far.link, 38_400, rts=rts) as line:
+        assert isinstance(line._wire, SerialConnection)
+        assert line._wire.port.rts is rts
+    peer = PortManagerPeer()
+    async with peer.served("rfc2217") as link, open_line(link, 38_400, rts=rts):
+        await until(lambda: peer.port.rts is rts)
 
 
 # -------------------------------------------------------------------------------------- plain TCP
