@@ -85,6 +85,7 @@ def test_system_lines_mean(line: str, command: object) -> None:
         ("$CK30", Parameter.PULSE, 30),
         ("$CL10", Parameter.SLOW, 10),
         ("$CM085", Parameter.D_ID, 85),
+        ("$CM4", Parameter.D_ID, 4),
         ("$CN2", Parameter.R_ID, 2),
         ("$Ca65535", Parameter.SPRF, 65535),
         ("$Cb3000", Parameter.CYCLE, 3000),
