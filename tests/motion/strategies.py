@@ -15,13 +15,16 @@ setups = st.builds(
     ustep=st.sampled_from([0, 0, 1, 3, 4, 7]),
     ihd=st.sampled_from([8, 8, 0, 20, 255]),
     xclk=st.sampled_from([0, 0, 30, 255]),
+    auto=st.sampled_from([False, False, True]),
 )
 
 accelerations = st.sampled_from([100, 100, 50, 37, 1, 250, 1047, 5000, 9999, 90000, NONE])
 
 
 @st.composite
-def motions(draw: st.DrawFn, sprf: int = 200, *, continuous: bool = False) -> Motion:
+def motions(
+    draw: st.DrawFn, sprf: int = 200, *, continuous: bool = False, steps: int = 400
+) -> Motion:
     """A command of some hundred steps, its velocity given in RPM or as a cycle."""
     if draw(st.booleans()):
         rpm = draw(st.integers(1, 700))
@@ -30,7 +33,7 @@ def motions(draw: st.DrawFn, sprf: int = 200, *, continuous: bool = False) -> Mo
         cycle_us = draw(st.integers(200, 60_000))
         rpm = 60_000_000 // (sprf * cycle_us)
     return Motion(
-        steps=None if continuous else draw(st.integers(1, 400)),
+        steps=None if continuous else draw(st.integers(1, steps)),
         cw=draw(st.booleans()),
         rpm=rpm,
         cycle_us=cycle_us,
@@ -49,4 +52,5 @@ def drive_of(setup: Setup) -> Drive:
         ustep=setup.ustep,
         ihd=setup.ihd,
         xclk=setup.xclk,
+        auto_micro=setup.auto,
     )
