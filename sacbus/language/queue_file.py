@@ -248,7 +248,6 @@ class _Fields:
         if read is None or read[0] is BARE or read[1] < len(word):
             raise self._wrong(f"{name} such as 1 or 10.47", _shown(word))
         for remark in line.remarks:
-            self._column += remark.column - 1
             self._remark(remark.expected, remark.got, remark.text)
         return read[0]
 

@@ -72,8 +72,8 @@ def test_a_wrong_row_is_named_by_file_line_and_column() -> None:
     )
 
 
-def test_a_line_without_an_end_is_refused_and_not_read() -> None:
-    with spool(b"\n" + b"1" * 2 * LONGEST_LINE) as kept:
+def test_a_line_that_is_far_too_long_is_refused_and_not_read() -> None:
+    with spool(b"\n" + b"1" * 2 * LONGEST_LINE + b"\n") as kept:
         sources: tuple[Source, ...] = (ListFile(kept), QueueFile(kept, Defaults()))
         for source in sources:
             with pytest.raises(PlanError, match=r"too long, list\.txt line 2, expected at most"):

@@ -9,12 +9,15 @@ from pathlib import Path
 import matplotlib as mpl
 import pytest
 
+from sacbus.language import Defaults
 from sacbus.motion import Drive
-from sacbus.plan import Commands, Plan, PlanError
+from sacbus.plan import Commands, Plan, PlanError, QueueFile, Spool
 from sacbus.plan.picture import MOST_COMMANDS, SHADES, draw_plan, picture_format
 from tests.drawing import load_fonts
 
 pytestmark = pytest.mark.slow
+
+DATA = Path(__file__).parents[1] / "data"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -53,9 +56,16 @@ def test_commands_are_named_where_they_run_and_directions_told() -> None:
     assert any(one.startswith("3 commands, ") for one in said)
 
 
-def test_a_queue_of_30_has_all_30_numbers() -> None:
-    lines = [f"m{200 + 40 * (n % 7)}v{60 + 10 * (n % 5)}" for n in range(30)]
-    assert {str(n) for n in range(1, 31)} <= set(words(drawn(*lines)))
+def test_the_companions_queue_of_30_has_all_30_numbers() -> None:
+    queue = DATA / "companion-queue.txt"
+    with queue.open("rb") as given, Spool(given, queue.name) as kept:
+        plan = Plan(QueueFile(kept, Defaults()), Drive())
+        file = io.BytesIO()
+        draw_plan(plan, plan.survey(), file, "svg")
+    said = words(file.getvalue())
+    numbers = [int(word) for word in said if word in map(str, range(1, 31))]
+    assert set(range(1, 31)) <= set(numbers)
+    assert "30 commands, 112.774451 s" in said
 
 
 def test_of_very_many_commands_those_are_numbered_that_have_room() -> None:
@@ -82,7 +92,7 @@ def test_time_is_told_in_a_unit_that_suits_it(line: str, unit: str) -> None:
 def test_the_same_plan_is_the_same_file_whatever_the_users_settings(form: str) -> None:
     before = drawn("m200v100", "m-200l1", form=form)
     assert before.startswith(b"\x89PNG" if form == "png" else b"<?xml")
-    with mpl.rc_context({"lines.linewidth": 9, "font.size": 30, "savefig.dpi": 10}):
+    with mpl.rc_context({"lines.linestyle": "--", "xtick.direction": "in", "font.size": 30}):
         mine = dict(mpl.rcParams)
         assert drawn("m200v100", "m-200l1", form=form) == before
         assert dict(mpl.rcParams) == mine

@@ -217,6 +217,15 @@ def test_the_second_loop_begins_with_what_the_first_left() -> None:
     assert (second.start, third.start) == (first.end, second.end)
 
 
+def test_what_a_loop_leaves_may_take_two_loops_to_settle() -> None:
+    # The first loop ends at 100 RPM, the second at 150, and only the third finds what it leaves.
+    looped = Plan(Commands(["m500d999", "v150"]), DRIVE, loops=5)
+    assert [one.profile.n_acc for one in looped] == [90, 50, 0, 0, 0]
+    survey = looped.survey()
+    assert survey.told_loops == 3
+    assert survey.duration == list(looped)[-1].end
+
+
 def test_a_start_velocity_counts_for_the_first_loop_alone() -> None:
     looped = Plan(Commands(["m500"]), DRIVE, loops=2, start_rpm=100)
     assert [one.profile.n_acc for one in looped] == [0, 90]
