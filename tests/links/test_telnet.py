@@ -13,7 +13,15 @@ from sacbus.links.link import SerialFormat
 from sacbus.links.telnet import LONGEST, Telnet
 from tests.links.programs import plain
 
-IAC, SE, SB, WILL, WONT, DO, DONT = b"\xff", b"\xf0", b"\xfa", b"\xfb", b"\xfc", b"\xfd", b"\xfe"
+IAC, SE, SB, WILL, WILL_NOT, DO, DO_NOT = (
+    b"\xff",
+    b"\xf0",
+    b"\xfa",
+    b"\xfb",
+    b"\xfc",
+    b"\xfd",
+    b"\xfe",
+)
 COM_PORT = b"\x2c"
 
 
@@ -73,7 +81,7 @@ garbage = st.lists(tricky, max_size=60).map(bytes)
 suboptions = st.builds(sub, st.integers(0, 20), st.one_of(st.binary(max_size=8), garbage))
 options = st.builds(
     lambda command, option: IAC + command + bytes((option,)),
-    st.sampled_from([WILL, WONT, DO, DONT]),
+    st.sampled_from([WILL, WILL_NOT, DO, DO_NOT]),
     st.one_of(st.sampled_from([0, 1, 3, 0x2C]), st.integers(0, 255)),
 )
 too_long = st.builds(
@@ -132,9 +140,9 @@ def test_a_client_is_offered_a_serial_port_from_the_start() -> None:
 
 
 def test_an_option_that_nobody_knows_is_declined() -> None:
-    assert Talk().says(IAC + WILL + b"\x18").answer == IAC + DONT + b"\x18"
-    assert Talk().says(IAC + DO + b"\x05").answer == IAC + WONT + b"\x05"
-    assert Talk().says(IAC + WONT + b"\x18", IAC + DONT + b"\x05").answer == b""
+    assert Talk().says(IAC + WILL + b"\x18").answer == IAC + DO_NOT + b"\x18"
+    assert Talk().says(IAC + DO + b"\x05").answer == IAC + WILL_NOT + b"\x05"
+    assert Talk().says(IAC + WILL_NOT + b"\x18", IAC + DO_NOT + b"\x05").answer == b""
 
 
 def test_a_client_that_takes_the_offer_is_told_the_modem_lines() -> None:
@@ -232,7 +240,7 @@ def test_another_command_cuts_a_suboption_off() -> None:
     nine_thousand_six_hundred = b"\x01\x00\x00\x25\x80"
     talk = Talk().says(IAC + SB + COM_PORT + nine_thousand_six_hundred)
     talk.says(IAC + DO + b"\x05" + b"data")
-    assert (talk.data, talk.answer) == (b"data", IAC + WONT + b"\x05")
+    assert (talk.data, talk.answer) == (b"data", IAC + WILL_NOT + b"\x05")
     assert talk.telnet.port.baudrate == 38_400
 
 
