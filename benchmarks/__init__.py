@@ -2,5 +2,6 @@
 
 from sacbus.wire import encode
 
-#: 20 bytes to node 10 that move nothing: what is measured is the way there and back.
-REQUEST = encode(10, 1, b"v100 and space")
+#: 20 bytes to node 10 that move nothing and are worth no remark: what is measured is the way there
+#: and back.
+REQUEST = encode(10, 1, b"v100".ljust(14))

@@ -48,7 +48,7 @@ def _tcp(outstanding: int, rounds: int) -> Figure:
     """So many requests on their way at a time, over one connection."""
     kind, packets = "tcp", [REQUEST]
     if outstanding > 1:
-        kind, packets = "tcp-many", [encode(node, 1, b"v100 and space") for node in MANY]
+        kind, packets = "tcp-many", [encode(node, 1, b"v100".ljust(14)) for node in MANY]
     with _tcp_client(kind, packets) as ours, _tcp_client("tcp-echo", packets) as bare:
         sides = [(server, partial(act, outstanding)) for server, act in (ours, bare)]
         took, baseline = cpu_each(sides, EXCHANGES, rounds)

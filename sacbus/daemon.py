@@ -10,6 +10,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 from pathlib import Path
 from random import Random
@@ -161,8 +162,10 @@ class HostedBus:
         def hear(heard: Heard, _now: Ns) -> None:
             link.send(tuning.to_client(heard.data))
 
+        arrive = self.host.arrive
+
         def deliver(data: bytes) -> None:
-            self.host.arrive(port.talk, tuning.from_client(data))
+            arrive(port.talk, tuning.from_client(data))
 
         link.open(deliver)
 
@@ -267,12 +270,12 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
 def _host(configuration: Configuration, bus: Bus, loop: asyncio.AbstractEventLoop) -> Host:
     if isinstance(loop, VirtualLoop):
         return VirtualHost(bus.kernel)
-    lane = bus.medium.master_lane
+    free_at = partial(bus.medium.free_at, bus.medium.master_lane)
     return RealHost(
         bus.kernel,
         loop,
         speed=configuration.speed,
-        line_free_at=None if configuration.pace else lambda: bus.medium.free_at(lane),
+        line_free_at=None if configuration.pace else free_at,
     )
 
 

@@ -111,14 +111,31 @@ class RealHost:
         return self._bus_anchor + round(elapsed * SECOND)
 
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
-        """Bring bus time up to date, call back, and see to what follows from it."""
+        """Bring bus time up to date, call back, and see to what follows from it.
+
+        The loop's timer is armed whatever comes out of that.
+        """
         if self._closed:
             return
+        kernel = self.kernel
         if self._busy:
             # From within an event: bus time is up to date, and the event is finished first.
-            self.kernel.at(self.kernel.now, callback, *arguments)
+            kernel.at(kernel.now, callback, *arguments)
             return
-        self._bring_up_to_date(callback, *arguments)
+        self._busy = True
+        try:
+            now = self.bus_now()
+            due = kernel.next_at()
+            if due is not None and due <= now:
+                self._catch_up(now)
+            else:
+                kernel.run_until(now)
+            callback(*arguments)
+            if self._line_free_at is not None:
+                self._run_ahead(self._line_free_at, now)
+        finally:
+            self._busy = False
+            self._arm()
 
     def spare(self) -> float:
         """Seconds until the next event; 0 when one is due, ``inf`` when there is none."""
@@ -136,24 +153,11 @@ class RealHost:
 
     def _due(self) -> None:
         self._timer = None
-        self._bring_up_to_date(_nothing)
+        self.arrive(_nothing)
 
-    def _bring_up_to_date(self, callback: Callable[..., object], *arguments: object) -> None:
-        """Run what is due, call back, run what follows; arm the timer whatever comes out of it."""
-        self._busy = True
-        try:
-            self._catch_up()
-            callback(*arguments)
-            if self._line_free_at is not None:
-                self._run_ahead(self._line_free_at)
-        finally:
-            self._busy = False
-            self._arm()
-
-    def _catch_up(self) -> None:
-        """Run what is due by now, and note how late it is."""
+    def _catch_up(self, limit: Ns) -> None:
+        """Run what is due by now, ``limit``, and note how late it is."""
         kernel = self.kernel
-        limit = self.bus_now()
         worst = 0
         # The limit stays, so that whatever the events cost, the loop gets its turn.
         while (when := kernel.next_at()) is not None and when <= limit:
@@ -175,15 +179,15 @@ class RealHost:
             told, self._untold = self._untold, 0
             self.late_watcher(told)
 
-    def _run_ahead(self, line_free_at: Callable[[], Ns | None]) -> None:
+    def _run_ahead(self, line_free_at: Callable[[], Ns | None], now: Ns) -> None:
         """Run the line's events without waiting, and move the anchor by what that gained."""
         kernel = self.kernel
         # Each round may put the line to use for longer; the clock stays at the last event.
         while (free_at := line_free_at()) is not None and kernel.run_due(free_at + _QUIET):
             pass
-        gained = kernel.now - self.bus_now()
-        if gained > 0:
-            self._bus_anchor += gained
+        # From when this began: what the clock has gone on meanwhile passes on the bus too.
+        if kernel.now > now:
+            self._bus_anchor += kernel.now - now
 
     def _arm(self) -> None:
         """Have the loop call when the next event is due."""

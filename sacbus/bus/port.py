@@ -49,6 +49,7 @@ class Port:
         "_hear",
         "_held",
         "_hold",
+        "_lane",
         "_latency",
         "_medium",
         "_ninth",
@@ -72,6 +73,7 @@ class Port:
         self._hold = hold
         self._held = False
         self._medium = medium
+        self._lane = medium.master_lane
         self._hear = hear
         self._latency = latency
         self._buffer = bytearray()
@@ -133,7 +135,7 @@ class Port:
         kernel = medium.kernel
         now = kernel.now
         if now != self._until:
-            free_at = medium.free_at(medium.master_lane)
+            free_at = medium.free_at(self._lane)
             earliest = now if free_at is None else max(now, free_at + self._latency)
             if earliest > now:
                 self._waiting = True
@@ -148,7 +150,7 @@ class Port:
         if self._ninth is not None:
             ninth = bytes(self._ninth[: len(chunk)])
             del self._ninth[: len(chunk)]
-        self._until = medium.transmit(self, chunk, medium.master_lane, ninth).end
+        self._until = medium.transmit(self, chunk, self._lane, ninth).end
         if self._buffer:
             self._waiting = True
             kernel.at(self._until, self._start)
