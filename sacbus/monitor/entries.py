@@ -35,8 +35,8 @@ class Spoken:
 
     ``gap``: silence before it on its lane; None when nobody knows what was before. ``sender`` in
     words, where that is known. ``request``: what an answer answers; ``delay``: from the request's
-    end to the answer's first bit, None when both came in one read. ``late``: it came after its
-    request had been told as unanswered.
+    end to the answer's first bit, None when that is not known. ``late``: it came after its request
+    had been told as unanswered.
     """
 
     start: Ns

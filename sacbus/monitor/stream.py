@@ -20,7 +20,8 @@ __all__ = ["Event", "Stream", "Stretch"]
 class Stretch:
     """Bytes that followed each other without a pause, from ``start`` to ``end``.
 
-    ``hits``: from when to when others talked over them.
+    ``hits``: from when to when others talked over them. ``squeezed``: they came in less time than
+    the line takes for them, so they had waited somewhere, and may have begun before ``start``.
     """
 
     start: Ns
@@ -28,6 +29,7 @@ class Stretch:
     data: bytes
     sender: str | None = None
     hits: Sequence[tuple[Ns, Ns]] = ()
+    squeezed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,5 +132,5 @@ class Stream:
         size = len(stretch.data)
         if span(size) == stretch.end - stretch.start:
             return stretch.start + span(index)
-        # Read late: several reads in a row, each of which came in no time.
+        # Squeezed: evenly, for want of anything better.
         return stretch.start + (stretch.end - stretch.start) * index // size

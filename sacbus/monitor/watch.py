@@ -96,10 +96,10 @@ class Watch:
 
         They began no later than the line's rate makes it, and no earlier than those before ended.
         """
-        lane = self._lanes[0]
-        entries = self._pass(now - self._rate.span(len(data)))
-        start = max(now - self._rate.span(len(data)), lane.until or 0)
-        stretch = Stretch(start, max(start, now), data)
+        start = now - self._rate.span(len(data))
+        entries = self._pass(start)
+        earliest = self._lanes[0].until or 0
+        stretch = Stretch(max(start, earliest), now, data, squeezed=start < earliest)
         return self._counted(entries + self._heard(0, stretch))
 
     def sent(self, sent: Sent) -> list[Entry]:
@@ -214,8 +214,9 @@ class Watch:
         waiting = self._open.pop((said.destination, said.source), None)
         if waiting is None:
             return spoken
-        # Within one read nothing is known of the silences between its bytes.
-        exact = spoken.sender is not None or event.began_in is not waiting.heard_in
+        # Of a link, nothing is known of the silences within one read, or before one that was late.
+        began_in = event.began_in
+        exact = spoken.sender is not None or not (began_in.squeezed or began_in is waiting.heard_in)
         return Spoken(
             spoken.start,
             spoken.end,

@@ -332,9 +332,11 @@ def test_a_plain_listener_decodes_and_never_writes_a_byte(runtime: Path) -> None
             see(monitor, "garbage")
             assert (packet["body"], packet["sender"]) == ("m400", None)
             assert 0 < packet["end_ns"] - packet["start_ns"] <= 2_604_166
-            # The answer was written only after the packet had been told.
+            # The answer was written only after the packet had been told; that may have been less
+            # than a ms after it, and then it came in less time than a line would have taken.
             assert answer["request_ns"] == packet["start_ns"]
-            assert answer["delay_ns"] == answer["start_ns"] - packet["end_ns"] >= 0
+            delay = answer["delay_ns"]
+            assert delay is None or delay == answer["start_ns"] - packet["end_ns"] >= 0
             assert monitor.send_signal(signal.SIGTERM) == 0
             summary = events(monitor.text)[-1]
             assert (summary["packets"], summary["unanswered"], summary["garbage"]) == (2, 1, 1)
@@ -374,8 +376,7 @@ def test_a_wire_between_two_others_is_listened_to(runtime: Path) -> None:
             assert monitor.ready["through"] == "link"
             line.write(M400 + ack(1, 10))
             (answer,) = see(monitor, "ack")
-            # One read as a rule; then nothing is known of the silence in between.
-            assert answer["delay_ns"] in (None, 0)
+            assert answer["request_ns"] == see(monitor, "packet")[0]["start_ns"]
             assert select.select([line.fileno()], [], [], 0)[0] == []
     finally:
         wire.close()
