@@ -361,10 +361,11 @@ async def test_a_held_adapter_is_held_still_when_it_comes_back(bench: Bench) -> 
     await bench.unplug()
     bench.link.hold(held=True)
     await bench.plug()
+    assert bench.link._connection is not None
+    port = bench.link._connection.port.fileno()
     with on_the_line(bench.wire) as program:
         program.write(b"waits")
-        for _ in range(50):
-            await asyncio.sleep(0)
+        await until(lambda: waiting(port) == 5)
         assert bench.heard == b""
         bench.link.hold(held=False)
         await until(lambda: bench.heard == b"waits")

@@ -110,6 +110,22 @@ def test_what_was_on_its_way_while_we_began_is_heard_in_its_order() -> None:
     assert echo.collisions == 0
 
 
+@pytest.mark.parametrize(
+    ("own", "heard", "foreign"),
+    [
+        (b"aaaa", [b"xaaa", b"a"], b"x"),  # not a beginning that was changed
+        (b"\1\0\0\0", [b"\0\0", b"\1\0\0\0"], b"\0\0"),  # not an end whose beginning was lost
+    ],
+)
+def test_what_looks_like_an_echo_with_a_fault_is_waited_with_while_it_may_be_another(
+    own: bytes, heard: list[bytes], foreign: bytes
+) -> None:
+    echo = Echo(BYTE)
+    echo.sent(own, now=0)
+    assert b"".join(echo.heard(piece) for piece in heard) == foreign
+    assert (echo.collisions, echo.missing, echo.due) == (0, 0, None)
+
+
 # ------------------------------------------------------------------------------- changed bytes
 
 
@@ -139,6 +155,13 @@ def test_whatever_a_collision_has_changed_what_is_heard_next_is_whole(
     foreign = echo.heard(spoilt) + echo.settle(later(len(PACKET)))
     assert (foreign, echo.collisions, echo.missing) == (b"", last - first, 0)
     assert echo.heard(ACK) == ACK
+
+
+def test_a_byte_that_was_changed_into_the_next_one_is_not_taken_for_lost() -> None:
+    echo = Echo(BYTE)
+    echo.sent(b"123456ca", now=0)
+    assert [echo.heard(bytes((byte,))) for byte in b"123456aaX"] == [b""] * 8 + [b"X"]
+    assert (echo.collisions, echo.missing) == (1, 0)
 
 
 @pytest.mark.parametrize("at", range(1, len(PACKET) - 1))

@@ -96,11 +96,12 @@ def wire() -> Iterator[Wire]:
 
 
 @pytest.mark.asyncio
-async def test_an_adapter_counts_framing_errors_over_losses(wire: Wire) -> None:
+async def test_an_adapter_is_quick_and_counts_framing_errors_over_losses(wire: Wire) -> None:
     with driven(Driver()) as driver:
         driver.framing_errors = 100
         link = AdapterLink(wire.near, 38_400, tell=lambda _text: None)
         link.open(lambda _data: None)
+        assert driver.flags == LOW_LATENCY
         assert link.counters.framing_errors == 0
         driver.framing_errors = 107
         assert link.counters.framing_errors == 7
