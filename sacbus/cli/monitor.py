@@ -1,0 +1,59 @@
+"""``sacbus monitor``: its options."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import click
+
+__all__ = ["monitor_command"]
+
+
+@click.command("monitor")
+@click.argument("link", required=False)
+@click.option(
+    "--baud",
+    type=click.IntRange(300, 4_000_000),
+    default=None,
+    help="Line rate of a link that no sacbus serves. Default: its kind's own.",
+)
+@click.option("--kind", default=None, help="The kind whose protocol is spoken. Default: sac.")
+@click.option(
+    "--node",
+    "nodes",
+    type=click.IntRange(0, 255),
+    multiple=True,
+    metavar="ADDRESS",
+    help="Show only what is from or to this node, or to all. May be repeated.",
+)
+@click.option("--errors", is_flag=True, help="Show only what went wrong.")
+@click.option("--clock", is_flag=True, help="Tell the time of day, not seconds.")
+@click.option("--wait", is_flag=True, help="Wait for LINK: at the start, and when it has gone.")
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of text.")
+@click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    help="Show senders and bytes too, and the traceback of an error.",
+)
+def monitor_command(
+    nodes: tuple[int, ...],
+    **given: Any,  # noqa: ANN401 (what Wanted takes under the same names)
+) -> int:
+    """Show what is said on a line, decoded as it happens. Ctrl-C ends it.
+
+    LINK is what a running bus serves: its port, or a URL; then times, senders and collisions are
+    exact, and the port is left to the program that uses it. Without LINK, the one bus that runs
+    here. Any other LINK is opened and listened to; not a byte is written to it. A summary comes
+    last, on standard error. Status: 1 when LINK has gone, 130 after Ctrl-C.
+
+    \b
+    Example: sacbus monitor /tmp/sacbus
+             sacbus monitor --node 10 --errors
+             sacbus monitor socket://127.0.0.1:7000 --json
+    """
+    from sacbus.monitor.run import monitor
+    from sacbus.monitor.wanted import Wanted
+
+    return asyncio.run(monitor(Wanted(nodes=frozenset(nodes), **given)))

@@ -1,0 +1,90 @@
+"""What the commands have in common: options, how arguments are read, exit statuses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Final, TypeVar
+
+import click
+
+from sacbus.config.notation import NotationError, addresses, endpoint
+
+__all__ = [
+    "INTERRUPTED",
+    "USAGE_STATUS",
+    "WrongInput",
+    "baud",
+    "read_addresses",
+    "read_endpoints",
+    "read_settings",
+    "verbose",
+]
+
+_T = TypeVar("_T")
+_F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command has
+
+#: Exit statuses (spec, cli): after Ctrl-C, and for what was not understood.
+INTERRUPTED: Final = 130
+USAGE_STATUS: Final = 2
+
+
+class WrongInput(click.ClickException):
+    """What stands in a file or a command is wrong, as an argument is; no help tells more of it."""
+
+    exit_code = USAGE_STATUS
+
+
+def verbose(command: _F) -> _F:
+    """``-v``, before a command's name or behind it; :func:`run` looks for it itself."""
+    option = click.option(
+        "-v",
+        "--verbose",
+        is_flag=True,
+        expose_value=False,
+        help="Show the traceback of an error.",
+    )
+    return option(command)
+
+
+baud = click.option(
+    "--baud",
+    type=click.IntRange(300, 4_000_000),
+    default=38_400,
+    show_default=True,
+    help="Line rate.",
+)
+
+
+def read_addresses(_ctx: click.Context, _param: click.Parameter, given: str) -> tuple[int, ...]:
+    """``10-19,85``, or ``none``."""
+    return () if given == "none" else _noted(addresses, given)
+
+
+def read_endpoints(
+    _ctx: click.Context, _param: click.Parameter, given: Sequence[str]
+) -> tuple[tuple[str, int], ...]:
+    """Each ``[HOST:]PORT``."""
+    return tuple(_noted(endpoint, one) for one in given)
+
+
+def _noted(read: Callable[[str], _T], text: str) -> _T:
+    try:
+        return read(text)
+    except NotationError as fault:
+        raise click.BadParameter(str(fault)) from fault
+
+
+def read_settings(
+    _ctx: click.Context, _param: click.Parameter, given: Sequence[str]
+) -> dict[str, object]:
+    """``--set NAME=VALUE``: whole numbers, true/false, or a word."""
+    settings: dict[str, object] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise click.BadParameter(f"expected NAME=VALUE, got {text!r}")
+        if value.lower() in ("true", "false"):
+            settings[name] = value.lower() == "true"
+        else:
+            settings[name] = int(value) if value.isascii() and value.isdecimal() else value
+    return settings
