@@ -6,7 +6,6 @@ Owns these shapes; knows no command.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TypeVar
 
 from sacbus.language.commands import Command
 from sacbus.language.line import Line
@@ -15,8 +14,6 @@ __all__ = ["Reader", "alone", "by_letter"]
 
 Reader = Callable[[Line, int], Command | None]
 """Reads a line from the index behind the letter, or letters, that chose this reader."""
-
-T = TypeVar("T")
 
 
 def alone(command: Command) -> Reader:
