@@ -106,7 +106,9 @@ class Spool:
                     )
                 yield line.rstrip("\n")
         finally:
-            text.detach()
+            # Who stops in the middle may close the file before this walk is cleared away.
+            if not self._kept.closed:
+                text.detach()
 
 
 class ListFile:

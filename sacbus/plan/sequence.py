@@ -83,7 +83,7 @@ class _Standing:
     """What a command leaves to the next one, but for the time.
 
     ramps: acceleration, deceleration and kind of the last command, None before the first.
-    last_period: ticks of its last pulse, against which GAP is measured.
+    last_period: ticks of its last pulse, against which GAP is measured; 0 if nothing is kept.
     """
 
     session: Session
@@ -250,7 +250,9 @@ class _Run:
         profile = plan(motion, self._drive, kept)
         planned = Planned(entry.text, motion, profile, start, remarks)
         self.end = planned.end
-        self.standing = _Standing(before.session, profile.kept_rpm, ramps, profile.last_period)
+        # Finding the last period lays the profile out; only a velocity that is kept needs it.
+        last_period = profile.last_period if profile.kept_rpm else 0
+        self.standing = _Standing(before.session, profile.kept_rpm, ramps, last_period)
         return planned
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import tracemalloc
 from pathlib import Path
@@ -94,6 +95,15 @@ def test_an_input_can_be_read_again_also_when_it_lies_on_disk() -> None:
         # Left in the middle, the next walk begins at the beginning all the same.
         assert next(iter(kept)) == "m10"
         assert sum(1 for _ in kept) == lines
+
+
+def test_a_walk_that_was_left_is_cleared_away_after_its_input_is_closed() -> None:
+    with spool(b"m10\nm20\n") as kept:
+        walk = iter(kept)
+        assert next(walk) == "m10"
+    # An exception in here would be one that nobody can catch, which fails the test as a warning.
+    del walk
+    gc.collect()
 
 
 @pytest.mark.slow
