@@ -38,6 +38,10 @@ def told(sacbus: Sacbus, word: str) -> int:
     return sum(one["event"] == "report" and word in one["text"] for one in events)
 
 
+def read_until_told(sacbus: Sacbus, word: str, times: int) -> None:
+    sacbus.read_until(lambda _: told(sacbus, word) >= times)
+
+
 def test_mother_reaches_the_nodes_of_both_however_often_the_cable_is_pulled(
     tmp_path: Path, cable: Wire
 ) -> None:
@@ -53,13 +57,13 @@ def test_mother_reaches_the_nodes_of_both_however_often_the_cable_is_pulled(
         for turn in range(1, TURNS + 1):
             cable.unplug()
             for one in (here, there):
-                one.read_until(lambda _, one=one, turn=turn: told(one, "is gone") == turn)
+                read_until_told(one, "is gone", turn)
             assert acknowledged(pty, "10V100")
             if turn == 1:
                 assert not acknowledged(pty, "20V100")
             cable.plug()
             for one in (here, there):
-                one.read_until(lambda _, one=one, turn=turn: told(one, "is back") == turn)
+                read_until_told(one, "is back", turn)
             assert acknowledged(pty, "20V100")
         for one in (here, there):
             assert one.send_signal(signal.SIGTERM) == 0
