@@ -233,17 +233,18 @@ class RemotePort:
             self._lose(self._heard.why)
 
 
-def _refusal(url: str, host: str, baud: int, fault: BaseException) -> LinkError:
+def _refusal(url: str, host: str, baud: int, fault: Exception) -> LinkError:
     """What pyserial's refusal to open a port comes from, in one line."""
-    cause: BaseException | None = fault
-    innermost = fault
-    while cause is not None:
-        if isinstance(cause, OSError) and not isinstance(cause, serial.SerialException):
-            return unreachable(url, host, cause)
-        innermost, cause = cause, cause.__context__
-    if str(fault).startswith("Could not open port"):  # the one it has for all that the URL says
+    if str(fault).startswith("Could not open port"):  # before there was a connection
+        cause: BaseException | None = fault
+        innermost: BaseException = fault
+        while cause is not None:
+            if isinstance(cause, OSError) and not isinstance(cause, serial.SerialException):
+                return unreachable(url, host, cause)
+            innermost, cause = cause, cause.__context__
         return LinkError(f"a malformed URL ({innermost})", url, "write it as rfc2217://host:port")
-    if "seem to support" in str(fault):
+    # An OSError of the system's own: it has hung up upon the first question.
+    if isinstance(fault, OSError) and (fault.errno or "seem to support" in str(fault)):
         what = "the peer is no RFC 2217 server"
     else:
         what = f"the peer is no RFC 2217 server, or does not take {baud} baud 8N1"

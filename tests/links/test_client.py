@@ -391,8 +391,11 @@ async def test_a_loop_that_stands_still_is_not_kept_more_for_than_the_bound() ->
         assert len(talk.heard) == client.BOUND
 
 
-async def test_a_caller_who_gives_up_while_it_is_opened_leaves_nothing_behind() -> None:
-    async with TcpPeer(lambda _data: b"").served("rfc2217") as link:
+@pytest.mark.parametrize("peer", [lambda: TcpPeer(lambda _data: b""), PortManagerPeer])
+async def test_a_caller_who_gives_up_while_it_is_opened_leaves_nothing_behind(
+    peer: Callable[[], TcpPeer],
+) -> None:
+    async with peer().served("rfc2217") as link:
         opening = asyncio.ensure_future(refusal(f"{link}?timeout=0.1"))
         await until(rooms)
         opening.cancel()
