@@ -18,8 +18,11 @@ from sacbus.language import (
     Forward,
     Motion,
     Move,
+    Ramp,
     Remark,
     Session,
+    StepMode,
+    ThrowAway,
     Velocity,
     parse,
 )
@@ -96,9 +99,9 @@ class Plan:
     """A sequence of commands, planned anew on every walk; immutable.
 
     Commands run as a node would run them from its queue, each as soon as the last has ended.
-    start_rpm is a velocity kept from before. V, A and D on lines of their own set session
-    defaults; ``xm…``, a throw-away, leaves them alone. With ``gap`` a command goes on at the
-    velocity kept by the one before if it is loaded in time; without, always. The whole is run
+    start_rpm is a velocity kept from before. V, A, D, $L, $F and $P on lines of their own set
+    session defaults; ``xm…``, a throw-away, leaves them alone. With ``gap`` a command goes on at
+    the velocity kept by the one before if it is loaded in time; without, always. The whole is run
     ``loops`` times.
     """
 
@@ -204,11 +207,8 @@ class _Run:
         """Go on by one entry; None if it only sets defaults."""
         if entry.motion is not None:
             return self._plan(entry, entry.motion, entry.remarks)
-        # A throw-away is the same motion; only what it leaves in the session is not.
-        thrown_away = entry.text[:2] in ("xm", "xM", "Xm", "XM")
-        parsed = parse(entry.text[thrown_away:])
-        moved = entry.skipped + thrown_away
-        remarks = tuple(replace(one, column=one.column + moved) for one in parsed.remarks)
+        parsed = parse(entry.text)
+        remarks = tuple(replace(one, column=one.column + entry.skipped) for one in parsed.remarks)
         session = self.standing.session
         command = parsed.command
         match command:
@@ -218,12 +218,18 @@ class _Run:
                 session = session.with_acceleration(command)
             case Deceleration():
                 session = session.with_deceleration(command)
+            case Ramp(linear):
+                session = session.with_ramp(linear=linear)
+            case StepMode(full_step):
+                session = session.with_full_step(full_step=full_step)
             case Move():
-                motion, after = session.resolve(command)
+                motion, session = session.resolve(command)
                 planned = self._plan(entry, motion, remarks)
-                if not thrown_away:
-                    self.standing = replace(self.standing, session=after)
+                self.standing = replace(self.standing, session=session)
                 return planned
+            case ThrowAway(move):
+                # The same motion; only what it would leave in the session is not.
+                return self._plan(entry, session.resolve(move)[0], remarks)
             case _:
                 raise PlanError(_refusal(entry, command, remarks))
         self.standing = replace(self.standing, session=session)
@@ -265,7 +271,7 @@ def _refusal(entry: Entry, command: object, remarks: tuple[Remark, ...]) -> str:
             "same on every node"
         )
     if command is not None:
-        return f"{line} is no motion, {where}, give M…, V, A or D commands"
+        return f"{line} is no motion, {where}, give M…, XM…, V, A, D, $L, $F or $P"
     first = remarks[0]  # without a command there is always one
     return (
         f"{line} is not understood, {where} column {first.column}, "

@@ -152,6 +152,12 @@ def test_velocity_and_ramps_on_lines_of_their_own_hold_for_what_follows() -> Non
     assert shares("m400v120a2d1", "m400")[1] == shares("m400v120a2d1")[0]
 
 
+def test_the_ramp_and_the_unit_of_steps_hold_for_what_follows() -> None:
+    assert shares("$L1", "m2000") == shares("m2000l1")
+    first, second = plan_sequence(["$P", "m80", "$F", "m80"], Drive(ustep=3))
+    assert (first.profile.pulses, second.profile.pulses) == (80, 640)
+
+
 def test_a_throw_away_takes_the_session_and_leaves_it_alone() -> None:
     # Manual, "Throw-away"; the companion's lists are made of these.
     assert shares("v120", "xm400a2", "m400") == [shares("m400v120a2d1")[0], shares("m400v120")[0]]
@@ -194,7 +200,7 @@ def test_a_command_that_is_held_for_sync_says_so() -> None:
         (["xm200q"], "'xm200q' is not understood, command 1 column 6"),
         (["m4294967296"], "command 1 column 2"),
         (["85m200"], "'85m200' begins with an address, command 1"),
-        (["x9"], "'x9' is no"),
+        (["x9"], "'x9' is no motion, command 1, give M…, XM…, V, A, D, $L, $F or $P"),
     ],
 )
 def test_what_cannot_be_planned_is_told_in_one_line(lines: list[str], message: str) -> None:
