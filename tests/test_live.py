@@ -122,6 +122,22 @@ def test_when_there_are_too_many_nodes_the_busy_ones_are_shown_in_order() -> Non
     assert lines[4] == "… and 17 more nodes"
 
 
+@pytest.mark.parametrize("count", range(9))
+def test_a_table_never_has_more_lines_than_there_are_rows(count: int) -> None:
+    lines = drawn([a_node(10 + number) for number in range(count)], 100, 5)
+    assert len(lines) <= 5
+    shown = sum(line.split()[1] == "STANDBY" for line in lines)
+    hidden = sum(int(line.split()[2]) for line in lines if line.startswith("…"))
+    assert shown + hidden == count
+
+
+def test_a_number_that_is_longer_than_its_column_is_whole_and_moves_those_behind_it() -> None:
+    rows = [line.split() for line in drawn([a_node(acks=1_234_567, naks=8), a_node(11)], 120, 10)]
+    assert rows[1][-2:] == ["1234567", "8"]
+    lines = drawn([a_node(acks=1_234_567, naks=8), a_node(11)], 120, 10)
+    assert len({len(line) for line in lines}) == 1
+
+
 def test_as_many_nodes_as_lines_are_all_shown() -> None:
     lines = drawn([a_node(address) for address in (10, 11, 12)], 100, 4)
     assert [line.split()[0] for line in lines] == ["node", "10", "11", "12"]
