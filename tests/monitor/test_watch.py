@@ -98,6 +98,13 @@ def test_who_asks_again_has_not_been_answered() -> None:
     assert told(rig.run())[3:] == ["no answer 1>99"]
 
 
+def test_silence_is_told_once() -> None:
+    rig = Rig(10)
+    for at in (0, 50 * MS):
+        rig.says(encode(99, 1, b"m400"), at=at)
+    assert told(rig.run()) == ["packet 1>99", "no answer 1>99"] * 2
+
+
 def test_silence_comes_before_what_is_said_after_it() -> None:
     rig = Rig(10)
     rig.says(encode(99, 1, b"m400"), at=0)
@@ -222,6 +229,18 @@ def test_while_somebody_still_talks_the_others_are_held_and_no_answer_is_missed(
     assert told(rig.entries)[:2] == ["packet 1>10", f"collision {LINK} node 10"]
     assert told(rig.entries)[-1] == "no answer 1>10"
     assert {"garbage"} == {*told(rig.entries)[2:-1]}
+
+
+def test_what_is_held_may_be_the_answer() -> None:
+    rig = Rig()
+    rig.says(M400, at=0)
+    # Over soon, but not told before the other one is, who goes on for half a second.
+    rig.stranger_says(ack(1, 10) + b"\x55", at=5 * MS)
+    rig.stranger_says(b"\x55" * 2_000, at=5 * MS + RATE.span(4))
+    assert told(rig.run(400 * MS)) == ["packet 1>10"]
+    entries = rig.run(600 * MS)
+    assert told(entries)[1:3] == ["ack 10>1", "collision somebody somebody"]
+    assert not spoken(entries[1]).late
 
 
 def test_collisions_one_after_the_other_are_told_apart() -> None:
