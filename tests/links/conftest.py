@@ -1,12 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 
 import pytest
 import pytest_asyncio
 
 from tests.links.rig import BACKENDS, Rig, rig_of
 from tests.links.servers import KINDS, AnyServer
+from tests.links.socat import Wire
 
 
 @pytest_asyncio.fixture(params=list(BACKENDS))
@@ -25,3 +26,14 @@ def kind(request: pytest.FixtureRequest) -> str:
 @pytest.fixture
 def server(kind: str) -> type[AnyServer]:
     return KINDS[kind][0]
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    """An adapter that is plugged in."""
+    wire = Wire()
+    try:
+        wire.plug()
+        yield wire
+    finally:
+        wire.close()

@@ -87,14 +87,6 @@ def test_framing_errors_are_those_since_the_last_look_also_when_the_count_runs_o
 # --------------------------------------------------------------------- an adapter makes use of it
 
 
-@pytest.fixture
-def wire() -> Iterator[Wire]:
-    wire = Wire()
-    wire.plug()
-    yield wire
-    wire.close()
-
-
 @pytest.mark.asyncio
 async def test_an_adapter_is_quick_and_counts_framing_errors_over_losses(wire: Wire) -> None:
     with driven(Driver()) as driver:
