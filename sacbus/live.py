@@ -30,8 +30,8 @@ _GIVE_WAY: Final = (5, 4)
 _LEAST: Final = 8
 _RIGHT: Final = frozenset((0, 2, 3, 6, 7))
 
-#: Nodes whose state is asked for in one piece of work, at about 1 us each.
-_AT_A_LOOK: Final = 16
+#: Nodes whose state is asked for in one piece of work, at 1 to 3 us each.
+_AT_A_LOOK: Final = 8
 
 _COLOURS: Final = {"ACCEL": "green", "CRUISE": "green", "DECEL": "yellow", "SYNC": "magenta"}
 

@@ -171,7 +171,7 @@ def test_a_table_is_drawn_in_pieces_however_many_nodes_there_are(rows: int) -> N
     done = (0, 0)
     for _ in table(nodes, lambda: 0, 100, rows):
         asked, looks = sum(node.asked for node in nodes), sum(len(n.looked_at) for n in nodes)
-        assert asked - done[0] <= 16
+        assert asked - done[0] <= 8
         assert looks - done[1] <= 1
         done = (asked, looks)
     assert done[1] == min(rows - 2, 250)
