@@ -201,6 +201,11 @@ def test_when_the_bus_ends_it_says_so_in_one_line(runtime: Path) -> None:
                 f"error: the bus {why}, {port}, start it again, or let --wait wait for it\n"
             )
             assert events(monitor.text)[-1]["event"] == "summary"
+        # What a killed bus leaves behind goes with the next look.
+        assert len(list((runtime / "sacbus").iterdir())) == (number == signal.SIGKILL)
+    with started("monitor") as monitor:
+        assert monitor.wait() == 1
+    assert list((runtime / "sacbus").iterdir()) == []
 
 
 def test_who_waits_sees_it_come_and_go_and_come_back(runtime: Path) -> None:
