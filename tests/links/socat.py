@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+import termios
 from pathlib import Path
 from typing import Final
 
@@ -43,7 +44,7 @@ class Wire:
             [SOCAT, *(f"pty,raw,echo=0,link={end}" for end in (self.near, self.far))],
             stdin=subprocess.DEVNULL,
         )
-        until(lambda: os.path.lexists(self.near) and os.path.lexists(self.far))
+        until(lambda: _is_raw(self.near) and _is_raw(self.far))
 
     def unplug(self) -> None:
         """Pull it out: the system hangs up on both ends, and socat takes its symlinks away."""
@@ -55,3 +56,16 @@ class Wire:
     def close(self) -> None:
         self.unplug()
         shutil.rmtree(self.directory)
+
+
+def _is_raw(path: str) -> bool:
+    """Whether the pty is there, and as it is to be: socat names it first and sets it after that."""
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except FileNotFoundError:
+        return False
+    try:
+        _, oflag, _, lflag, _, _, _ = termios.tcgetattr(descriptor)
+    finally:
+        os.close(descriptor)
+    return not oflag & termios.OPOST and not lflag & (termios.ECHO | termios.ICANON)
