@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import tempfile
 import termios
-import termios
 from pathlib import Path
 from typing import Final
 
@@ -70,16 +69,3 @@ def _is_raw(path: str) -> bool:
     finally:
         os.close(descriptor)
     return not oflag & termios.OPOST and not lflag & (termios.ECHO | termios.ICANON)
-
-
-def _raw(path: str) -> bool:
-    """Whether that pty is there and passes bytes as they are: socat names it a little earlier."""
-    try:
-        slave = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    except OSError:
-        return False
-    try:
-        _, output, _, local, *_ = termios.tcgetattr(slave)
-    finally:
-        os.close(slave)
-    return not output & termios.OPOST and not local & (termios.ICANON | termios.ECHO)
