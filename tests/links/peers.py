@@ -35,7 +35,7 @@ __all__ = [
     "of_tcp",
 ]
 
-SER2NET: Final = shutil.which("ser2net", path="/usr/sbin:/usr/bin:/usr/local/sbin:/usr/local/bin")
+SER2NET: Final = shutil.which("ser2net", path=os.environ.get("PATH", "") + ":/usr/sbin")
 
 
 @dataclass
