@@ -90,6 +90,9 @@ class Even:
     def write(self, first: int, out: Ticks64, shift: int) -> None:
         """Fill `out` with `shift + time(i)` for i from `first` on."""
         begin, period = first * self.period + shift, self.period
+        if out.size == 1:  # a period that does not fit the array never comes twice
+            out[0] = begin
+            return
         for at in range(0, out.size, _COUNT.size):
             part = out[at : at + _COUNT.size]
             np.multiply(_COUNT[: part.size], period, out=part)

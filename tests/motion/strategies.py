@@ -40,8 +40,9 @@ def motions(
         acc100=draw(accelerations),
         dec100=draw(accelerations),
         linear=draw(st.booleans()),
-        extra_pulses=draw(st.sampled_from([0, 0, 1, 7, 255])),
-        pulses=draw(st.booleans()),
+        # Most of them plain, because only those shift gears.
+        extra_pulses=draw(st.sampled_from([0, 0, 0, 0, 0, 1, 7, 255])),
+        pulses=draw(st.sampled_from([False, False, False, True])),
     )
 
 

@@ -98,6 +98,16 @@ def limits(motion: Motion, drive: Drive = FACTORY, start: int = 0) -> set[Limit]
             command(500, 100, 999), Drive(pull_in_rpm=99), 0, {Limit.PULL_IN}, id="jump from rest"
         ),
         pytest.param(command(500, 100, 999), Drive(pull_in_rpm=99), 100, set(), id="no jump, kept"),
+        pytest.param(
+            command(500, 200, 999), Drive(pull_in_rpm=99), 100, {Limit.STALL}, id="jump, kept"
+        ),
+        pytest.param(
+            command(900, 200, 1, 1),
+            Drive(pull_in_rpm=99, pull_out=((150, 90),)),
+            0,
+            {Limit.STALL},
+            id="faster than the curve goes",
+        ),
         pytest.param(command(500, 100), Drive(pull_in_rpm=99), 0, set(), id="ramp below pull-in"),
     ],
 )
@@ -110,3 +120,19 @@ def test_a_command_is_warned_of(
 def test_a_warning_is_a_sentence_with_its_numbers() -> None:
     (caution,) = plan(command(50, 100), FACTORY, 100).warnings
     assert str(caution) == "deceleration sets in at 59 RPM, straight from 100 RPM"
+
+
+def test_a_stall_is_told_with_its_pulse() -> None:
+    drive = Drive(pull_in_rpm=99, pull_out=((150, 90),))
+    (caution,) = plan(command(900, 200), drive).warnings
+    assert str(caution) == "the motor stalls at pulse 141: it turns at 150 RPM at most"
+    (caution,) = plan(command(900, 200, 999), Drive(pull_in_rpm=99)).warnings
+    assert str(caution) == (
+        "from rest to 200 RPM at once: the motor pulls in up to 99 RPM and may stall"
+    )
+
+
+def test_in_a_coarse_gear_a_fall_is_told_by_full_steps_all_the_same() -> None:
+    for start, expected in ((300, {Limit.FALL}), (0, {Limit.TARGET})):
+        drive = Drive(ustep=4, auto_micro=True)
+        assert limits(command(20, 300, 10, 10), drive, start) == expected

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -228,3 +230,48 @@ def test_zero_settings_act_as_the_spec_says() -> None:
     drive = Drive(sprf=0, slow_rpm=0)
     assert (drive.steps_per_rev, drive.slow) == (200, 1)
     assert plan(command(500, 100), drive).n_acc == 99
+
+
+@pytest.mark.parametrize("linear", [False, True])
+def test_a_long_window_is_the_short_ones_in_a_row(linear: bool) -> None:
+    profile = plan(command(60_000, 600, 0.5, 0.3, linear=linear), Drive(ustep=3))
+    end = duration(profile)
+    whole = profile.pulse_times(0, end)
+    assert whole.size == 480_000
+    cuts = [*range(0, end, end // 700), end]
+    parts = [profile.pulse_times(since, until) for since, until in pairwise(cuts)]
+    assert np.array_equal(np.concatenate(parts), whole)
+    for pulse in range(0, 480_000, 9_973):
+        assert profile.time_of(pulse) == whole[pulse]
+
+
+@pytest.mark.parametrize(
+    ("pulse_us", "falls"),
+    [(0, [0, 100, 200]), (1, [2, 102, 202]), (49, [98, 198, 298]), (50, [99, 199, 299])],
+)
+def test_clk_falls_before_the_next_pulse_at_the_latest(pulse_us: int, falls: list[int]) -> None:
+    drive = Drive(pulse_us=pulse_us)
+    profile = plan(replace(command(3, 100, 999, 999), cycle_us=50), drive)
+    assert profile.clk_falls(0, 1_000).tolist() == falls
+    assert profile.clk_falls(1, 200).tolist() == falls[1:2]
+    assert profile.clk_falls(201, 1_000).size == 0
+
+
+def test_clk_falls_where_the_next_pulse_is_beyond_an_array() -> None:
+    profile = plan(replace(command(2, 1, 999, 999), cycle_us=2**63), FACTORY)
+    assert profile.clk_falls(0, 100).tolist() == [2]
+
+
+def test_the_tail_of_continuous_motion_goes_on_as_the_whole() -> None:
+    profile = plan(command(None, 100), Drive(ustep=2))
+    for rpm in (300, 50, 200):
+        profile = profile.retarget(profile.time_of(500) + rpm, command(None, rpm, 5))
+    for at in (0, profile.time_of(3), profile.time_of(501), 10**9):
+        first, tail = profile.tail(at)
+        begin = profile.time_of(first)
+        assert first % 4 == 0
+        assert begin <= at < profile.time_of(first + 4)
+        later = np.array(profile.pulse_times(begin, begin + 10**8))
+        assert np.array_equal(tail.pulse_times(0, 10**8) + begin, later)
+        assert (tail.duration, tail.kept_rpm, tail.motion) == (None, 0, profile.motion)
+        assert tail.start_rpm == profile.drive.rpm(profile.course.place_of(first).pace.speed)
