@@ -16,7 +16,7 @@ from pathlib import Path
 from random import Random
 from typing import assert_never
 
-from sacbus.bus import LATENCY, Bus, LivePort, Port
+from sacbus.bus import LATENCY, PLAIN_BITS, Bus, LivePort, Port
 from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
 from sacbus.kernel import US, Kernel, LineRate, Ns
 from sacbus.links import Link, Tuning
@@ -157,7 +157,9 @@ class HostedBus:
         self.links.append(server)
 
     def _seat(self, link: Link, *, echo: bool, latency: Ns) -> Port:
-        tuning = Tuning(link, self.bus.rate.baud, Random(self.configuration.seed), self.tell)
+        rate = self.bus.rate
+        noise = Random(self.configuration.seed)
+        tuning = Tuning(link, rate.baud, noise, self.tell, bits=rate.bits)
 
         def hear(heard: Heard, _now: Ns) -> None:
             link.send(tuning.to_client(heard.data))
@@ -167,7 +169,12 @@ class HostedBus:
         def deliver(data: bytes) -> None:
             arrive(port.talk, tuning.from_client(data))
 
-        link.open(deliver)
+        def deliver_nine(data: bytes) -> None:
+            # Parity and bytes come in this order. Without parity a stop bit stands in its place.
+            ninth = tuning.ninth()
+            arrive(port.talk, tuning.from_client(data), 1 if ninth is None else ninth)
+
+        link.open(deliver_nine if rate.bits > PLAIN_BITS else deliver)
 
         def hold(held: bool) -> None:
             link.hold(held=held)

@@ -13,13 +13,15 @@ import pytest
 import serial
 
 from sacbus import open_bus
+from sacbus.bus import Bus
 from sacbus.daemon import Configuration, HostedBus
-from sacbus.host import run_virtual
-from sacbus.kernel import MS, SECOND, Kernel
+from sacbus.host import RealHost, run_virtual
+from sacbus.kernel import MS, SECOND, Kernel, LineRate, Ns
 from sacbus.links import LinkError, MemoryLink, PathTaken, PtyLink
 from sacbus.links.places import PtyAt
+from sacbus.links.rfc2217 import Rfc2217Server
 from sacbus.mother import LineLost, Mother
-from sacbus.node import KindError, SettingError
+from sacbus.node import Heard, KindError, SettingError, find_kind
 from sacbus.state import StateDirectory, StateError
 from sacbus.wire import encode
 
@@ -564,5 +566,50 @@ def test_a_link_that_cannot_be_closed_is_told_and_keeps_nothing_else_open(tmp_pa
         assert list(tmp_path.iterdir()) == []
         with pytest.raises(LineLost):
             await mothers[0].send(10, "y")
+
+    asyncio.run(scene())
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")  # pyserial's
+def test_mark_and_space_parity_over_rfc_2217_set_the_ninth_bits_on_a_line_that_has_some() -> None:
+    rate = LineRate(9_600, bits=11)
+
+    class NinthBits:
+        def __init__(self) -> None:
+            self.heard: list[tuple[bytes, bytes | None]] = []
+
+        def hear(self, heard: Heard, now: Ns) -> None:
+            self.heard.append((heard.data, heard.ninth))
+
+    def address_then_operands(url: str) -> None:
+        """What a controller of a nine-bit bus does: the parity is switched for the header."""
+        with serial.serial_for_url(url, 9_600, parity=serial.PARITY_MARK, timeout=20) as port:
+            port.write(b"\x51")
+            port.parity = serial.PARITY_SPACE
+            port.write(b"\x01\x02")
+            port.parity = serial.PARITY_NONE
+            port.write(b"\xff")
+
+    async def scene() -> None:
+        kernel = Kernel()
+        bus = Bus(kernel, find_kind("sac").protocol, rate=rate)
+        hosted = HostedBus(
+            Configuration(nodes=()), bus, RealHost(kernel, asyncio.get_running_loop())
+        )
+        ear = NinthBits()
+        bus.medium.listen(0, ear, None)
+        try:
+            server = Rfc2217Server(baud=9_600)
+            await hosted.let_in(server)
+            await asyncio.to_thread(address_then_operands, server.where)
+            async with asyncio.timeout(20):
+                while sum(len(data) for data, _ in ear.heard) < 4:  # noqa: ASYNC110
+                    await asyncio.sleep(0.001)
+        finally:
+            hosted.close()
+        assert b"".join(data for data, _ in ear.heard) == b"\x51\x01\x02\xff"
+        assert b"".join(ninth or b"" for _, ninth in ear.heard) == b"\x01\x00\x00\x01"
+        assert bus.report_counts == {}
 
     asyncio.run(scene())

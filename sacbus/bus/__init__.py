@@ -3,11 +3,12 @@
 from sacbus.bus.bus import Bus
 from sacbus.bus.live_port import LivePort
 from sacbus.bus.medium import LaneCounters, Listener, Medium
-from sacbus.bus.port import LATENCY, Port
+from sacbus.bus.port import LATENCY, PLAIN_BITS, Port
 from sacbus.bus.transmission import Transmission
 
 __all__ = [
     "LATENCY",
+    "PLAIN_BITS",
     "Bus",
     "LaneCounters",
     "Listener",

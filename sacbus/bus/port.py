@@ -13,7 +13,7 @@ from sacbus.bus.medium import Medium
 from sacbus.kernel import MS, Ns
 from sacbus.node import Heard
 
-__all__ = ["LATENCY", "Port"]
+__all__ = ["LATENCY", "PLAIN_BITS", "Port"]
 
 #: A paced link starts to send no earlier than this after the line went idle, as a USB adapter's
 #: round trip makes it; so a quick client does not fall into a node's deaf time.
@@ -30,7 +30,7 @@ FULL: Final = 16_384
 LOW: Final = 4_096
 
 #: Bits of a byte on a line without ninth bits: start, eight, stop.
-_PLAIN_BITS: Final = 10
+PLAIN_BITS: Final = 10
 
 
 class Port:
@@ -78,7 +78,7 @@ class Port:
         self._latency = latency
         self._buffer = bytearray()
         #: Their ninth bits, on a line that has some.
-        self._ninth = bytearray() if medium.rate.bits > _PLAIN_BITS else None
+        self._ninth = bytearray() if medium.rate.bits > PLAIN_BITS else None
         #: True while an appointment to start or to go on sending stands.
         self._waiting = False
         #: When the port's own last transmission ends.

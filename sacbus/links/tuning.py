@@ -11,6 +11,8 @@ from collections.abc import Callable
 from random import Random
 from typing import Final
 
+from sacbus.bus import PLAIN_BITS
+
 from .link import FormattedLink, Link, SerialFormat
 
 __all__ = ["Tuning"]
@@ -24,8 +26,7 @@ TOLERANCE: Final = 2.5
 #: do without.
 TRUST: Final = 8
 
-#: Bits of a byte on a line without ninth bits (start, eight, stop), and on one with them.
-PLAIN_BITS: Final = 10
+#: Bits of a byte on a line with ninth bits; without, PLAIN_BITS.
 NINE_BITS: Final = 11
 
 #: Parities that a line understands: of 8N1 only none, since the parity bit comes where the stop bit
