@@ -74,8 +74,8 @@ class Drive:
     rate: int = field(init=False, repr=False, compare=False)
     slow_speed: int = field(init=False, repr=False, compare=False)
     offset: int = field(init=False, repr=False, compare=False)
-    # `plan`'s own memory of (n_acc, n_dec, ticks of both) by velocity, acc, dec and start velocity.
-    whole_ramps: dict[tuple[int, int, int, Rpm], tuple[int, int, int]] = field(
+    # `plan`'s own memory of (n_acc, n_dec, ticks of both) by velocity, acc, dec, linear, and start.
+    whole_ramps: dict[tuple[int, int, int, bool, Rpm], tuple[int, int, int]] = field(
         init=False, repr=False, compare=False
     )
 

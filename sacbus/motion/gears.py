@@ -2,8 +2,9 @@
 
 Owns the choice of the exponent. Each full step is made of the most microsteps, up to the node's own
 ustep, with which its shortest pulse still lasts LONG_ENOUGH_US; of none where even that is quicker.
-It changes between full steps only. A command that does not count in full steps (pulse mode, or with
-U pulses) leaves them, and runs at the node's ustep throughout.
+It changes between full steps only; a velocity that deceleration holds (layout.py) keeps the
+exponent in which it was reached. A command that does not count in full steps (pulse mode, or with U
+pulses) leaves them, and runs at the node's ustep throughout.
 
 A pulse's *weight* (drive.py) stands for the exponent: 2 ** (ustep - exponent), from 1 at the
 finest microsteps to `drive.m` at full steps.

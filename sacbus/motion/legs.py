@@ -137,7 +137,12 @@ class Forth:
 
     def write(self, first: int, out: Ticks64, shift: int) -> None:
         """Fill `out` with `shift + time(i)` for i from `first` on."""
-        self.ramp.write(self.begin + first, out, shift - self.ramp.time(self.begin))
+        begin = self.begin + first
+        shift -= self.ramp.time(self.begin)
+        done = 0
+        for piece in self.ramp.pieces(begin, begin + out.size):
+            np.add(piece, shift, out=out[done : done + piece.size])
+            done += piece.size
 
     def speed(self, pulse: int) -> int:
         """Nominal speed of a pulse."""
@@ -184,12 +189,12 @@ class Back:
 
     def write(self, first: int, out: Ticks64, shift: int) -> None:
         """Fill `out` with `shift + time(i)` for i from `first` on."""
+        last = self.end - first
         shift += self.ramp.time(self.end)
-        for at in range(0, out.size, _COUNT.size):
-            part = out[at : at + _COUNT.size]
-            last = self.end - first - at
-            forwards = self.ramp.times(last - part.size + 1, last + 1)
-            np.subtract(shift, forwards[::-1], out=part)
+        left = out.size  # the ramp's own times come slowest first: they are put in from the back
+        for piece in self.ramp.pieces(last - out.size + 1, last + 1):
+            np.subtract(shift, piece[::-1], out=out[left - piece.size : left])
+            left -= piece.size
 
     def speed(self, pulse: int) -> int:
         """Nominal speed of a pulse."""

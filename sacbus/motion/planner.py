@@ -25,8 +25,8 @@ def plan(motion: Motion, drive: Drive, start_rpm: Rpm = 0) -> Profile:
     """
     steps = motion.steps
     known = None
-    key = (motion.rpm, motion.acc100, motion.dec100, start_rpm)
-    if not (steps is None or motion.linear or motion.pulses):
+    key = (motion.rpm, motion.acc100, motion.dec100, motion.linear, start_rpm)
+    if not (steps is None or motion.pulses):
         known = drive.whole_ramps.get(key)
         if known is not None:
             n_acc, n_dec, ramps = known
@@ -42,13 +42,16 @@ def plan(motion: Motion, drive: Drive, start_rpm: Rpm = 0) -> Profile:
     shares = share_out(motion, drive, start_rpm)
     ends_at_speed = motion.steps is not None and not has_ramp(motion.dec100)
     kept = motion.rpm if ends_at_speed else 0
+    profile = None
     if not (motion.linear or shares.cruise is None or drive.auto_micro):
         duration = _harmonic_duration(motion, drive, start_rpm, shares)
         if duration >= 0:
-            if known is None and not (shares.truncated or motion.pulses):
-                _remember(key, drive, shares, duration, motion)
-            return Profile(motion, drive, start_rpm, shares, duration, kept)
-    return Profile.laid_out(motion, drive, start_rpm, shares, kept)
+            profile = Profile(motion, drive, start_rpm, shares, duration, kept)
+    if profile is None:
+        profile = Profile.laid_out(motion, drive, start_rpm, shares, kept)
+    if known is None and profile.duration is not None:
+        _remember(key, drive, shares, profile.duration, motion)
+    return profile
 
 
 def share_out(motion: Motion, drive: Drive, start_rpm: Rpm) -> Shares:
@@ -88,9 +91,15 @@ def share_out(motion: Motion, drive: Drive, start_rpm: Rpm) -> Shares:
 
 
 def _remember(
-    key: tuple[int, int, int, Rpm], drive: Drive, shares: Shares, duration: int, motion: Motion
+    key: tuple[int, int, int, bool, Rpm],
+    drive: Drive,
+    shares: Shares,
+    duration: int,
+    motion: Motion,
 ) -> None:
     """Keep what both whole ramps take: the next command of these speeds differs in its cruise."""
+    if shares.truncated or motion.pulses or drive.auto_micro:
+        return
     cruised = (shares.cruise_pulses or 0) * drive.cruise_period(motion.cycle_us)
     if len(drive.whole_ramps) >= _REMEMBERED:
         drive.whole_ramps.clear()

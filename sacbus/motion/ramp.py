@@ -8,13 +8,14 @@ Theory of operation. The first HEAD pulses are summed one by one into a compact 
 ramps end there, and a look-up is an index. Further up a ramp many pulses share one truncated
 period, so the rest is held as runs (period, count). A page is PAGE consecutive period values;
 only the index and the time where each page begins are kept, the pages themselves live in a small
-LRU. A ramp of millions of pulses thus costs kilobytes and a few milliseconds.
+LRU, as do the blocks of pulse times that somebody asked for. A ramp of millions of pulses thus
+costs kilobytes and a few milliseconds.
 Source: spec, "Profile" (exact pulse times are the cumulative sum of truncated periods).
 """
 
 from array import array
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from itertools import accumulate
 from typing import Final, NamedTuple, Protocol
@@ -35,8 +36,11 @@ PAGE: Final = 2048
 
 PAGES_KEPT: Final = 64
 
-CHUNK: Final = 1 << 15
-"""Pulses of a page written at a time: what lies between then stays in the processor's cache."""
+BLOCK: Final = 1 << 14
+"""Pulses of a tail whose times are worked out together: 128 KiB."""
+
+BLOCKS_KEPT: Final = 64
+"""8 MiB at most, for all ramps."""
 
 FAR: Final = 1 << 50
 """A pulse index beyond every ramp: 32-bit steps at 128 microsteps stay below 2**39."""
@@ -75,8 +79,8 @@ class _Page(NamedTuple):
         run = int(self.starts.searchsorted(index, "right")) - 1
         return int(self.times[run]) + (index - int(self.starts[run])) * int(self.periods[run])
 
-    def write(self, first: int, out: Ticks64, shift: int) -> None:
-        """Fill `out` with `shift +` the times of the page's pulses from `first` on."""
+    def write(self, first: int, out: Ticks64) -> None:
+        """Fill `out` with the times of the page's pulses from `first` on."""
         starts = self.starts
         low = int(starts.searchsorted(first, "right")) - 1
         high = int(starts.searchsorted(first + out.size, "left"))
@@ -84,7 +88,7 @@ class _Page(NamedTuple):
         steps = np.repeat(self.periods[low:high], ends[1:] - ends[:-1])
         out[0] = 0
         np.cumsum(steps[:-1], out=out[1:])
-        out += self.time(first) + shift
+        out += self.time(first)
 
 
 class Ramp:
@@ -135,29 +139,22 @@ class Ramp:
         run = int(page.times.searchsorted(ticks, "right")) - 1
         return int(page.starts[run]) + (ticks - int(page.times[run])) // int(page.periods[run])
 
-    def write(self, first: int, out: Ticks64, shift: int) -> None:
-        """Fill `out` with `shift + time(i)` for i from `first` on."""
-        last = first + out.size
-        done = 0
-        if first <= HEAD:
-            upto = min(last, HEAD + 1)
-            self.time(upto - 1)
-            done = upto - first
-            head = np.frombuffer(self.sums, dtype=np.int64)[first:upto]
-            np.add(head, shift, out=out[:done])
-        while first + done < last:
-            begin = first + done
-            page = _page(self, self._page_with_index(begin))
-            upto = min(last, begin + CHUNK, int(page.starts[-1]))
-            page.write(begin, out[done : upto - first], shift)
-            done = upto - first
+    def pieces(self, first: int, last: int) -> Iterator[Ticks64]:
+        """`time(i)` for i in [first, last), in arrays that follow each other: views of the tables.
 
-    def times(self, first: int, last: int) -> Ticks64:
-        """`time(i)` for i in [first, last), as one array."""
-        out = np.empty(max(0, last - first), dtype=np.int64)
-        if out.size:
-            self.write(first, out, 0)
-        return out
+        Nobody may write to them.
+        """
+        if first < min(last, HEAD):
+            upto = min(last, HEAD)
+            self.time(upto - 1)
+            yield np.frombuffer(self.sums, dtype=np.int64)[first:upto]
+            first = upto
+        while first < last:
+            number, begin = divmod(first - HEAD, BLOCK)
+            upto = min(BLOCK, begin + last - first)
+            # A ramp that slows down comes to an end, so no further than is asked for.
+            yield _block(self, number, BLOCK if self.law.falling else upto)[begin:upto]
+            first += upto - begin
 
     def _grow(self, index: int) -> None:
         """Make the head reach `index`; doubling, so that the work stays in proportion."""
@@ -205,7 +202,24 @@ class Ramp:
             self._mark_time.append(int(times[-1]))
         return _Page(starts, times, periods)
 
+    def _build_block(self, number: int, count: int) -> Ticks64:
+        """The times of the first pulses of a block, from all the pages that they lie on."""
+        out = np.empty(count, dtype=np.int64)
+        first = HEAD + number * BLOCK
+        done = 0
+        while done < count:
+            page = _page(self, self._page_with_index(first + done))
+            upto = min(count, int(page.starts[-1]) - first)
+            page.write(first + done, out[done:upto])
+            done = upto
+        return out
+
 
 @lru_cache(maxsize=PAGES_KEPT)
 def _page(ramp: Ramp, number: int) -> _Page:
     return ramp._build_page(number)  # noqa: SLF001  the other half of the class, cached
+
+
+@lru_cache(maxsize=BLOCKS_KEPT)
+def _block(ramp: Ramp, number: int, count: int) -> Ticks64:
+    return ramp._build_block(number, count)  # noqa: SLF001  as above

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from sacbus.motion.harmonic import HarmonicLaw, harmonic
 from sacbus.motion.linear import LinearLaw, linear
-from sacbus.motion.ramp import HEAD, PAGE, Ramp
+from sacbus.motion.ramp import BLOCK, HEAD, PAGE, Ramp
 
 RATE = 60_000_000
 """drive.rate at 200 steps a revolution."""
@@ -24,9 +25,15 @@ def slow_sums(ramp: Ramp, count: int, offset: int) -> list[int]:
     return list(accumulate((max(1, p + offset) for p in periods), initial=0))
 
 
+def times(ramp: Ramp, first: int, last: int) -> NDArray[np.int64]:
+    pieces = list(ramp.pieces(first, last))
+    assert all(piece.size for piece in pieces)
+    return np.concatenate(pieces)
+
+
 def assert_sums(ramp: Ramp, count: int, offset: int) -> None:
     expected = slow_sums(ramp, count, offset)
-    assert np.array_equal(ramp.times(0, len(expected)), expected)
+    assert np.array_equal(times(ramp, 0, len(expected)), expected)
     step = max(1, count // 97)
     for index in {*range(0, count, step), HEAD - 1, HEAD, HEAD + 1, count} & set(range(count + 1)):
         assert ramp.time(index) == expected[index]
@@ -34,7 +41,7 @@ def assert_sums(ramp: Ramp, count: int, offset: int) -> None:
         assert ramp.index(expected[index], count) == index
         assert ramp.index(expected[index + 1] - 1, count) == index
         assert ramp.period(index) == expected[index + 1] - expected[index]
-    assert ramp.times(count // 2, count).tolist() == expected[count // 2 : count]
+    assert times(ramp, count // 2, count).tolist() == expected[count // 2 : count]
 
 
 @pytest.mark.slow
@@ -79,7 +86,7 @@ def test_a_linear_ramp_is_the_recurrence_pulse_by_pulse(
 ) -> None:
     count = 60_000
     ramp = Ramp(LinearLaw(pulses_per_rev, acc100, RATE), offset)
-    assert np.array_equal(ramp.times(0, count + 1), slow_sums(ramp, count, offset))
+    assert np.array_equal(times(ramp, 0, count + 1), slow_sums(ramp, count, offset))
 
 
 @pytest.mark.slow
@@ -89,7 +96,7 @@ def test_a_linear_ramp_of_a_million_pulses_is_still_the_recurrence(
 ) -> None:
     count = 1_000_000
     ramp = Ramp(LinearLaw(pulses_per_rev, acc100, RATE), 0)
-    assert np.array_equal(ramp.times(0, count + 1), slow_sums(ramp, count, 0))
+    assert np.array_equal(times(ramp, 0, count + 1), slow_sums(ramp, count, 0))
 
 
 def test_a_crossing_too_close_to_call_is_walked_to() -> None:
@@ -101,7 +108,7 @@ def test_a_crossing_too_close_to_call_is_walked_to() -> None:
         law._first *= int(c) / c * (1 + ulps * 2.0**-52)
         law._reached = (0, law._first)
         ramp = Ramp(law, 0)
-        assert np.array_equal(ramp.times(4_900, 5_101), slow_sums(ramp, 5_100, 0)[4_900:])
+        assert np.array_equal(times(ramp, 4_900, 5_101), slow_sums(ramp, 5_100, 0)[4_900:])
 
 
 def test_a_walk_starts_over_for_an_earlier_pulse() -> None:
@@ -128,16 +135,27 @@ def test_a_time_far_up_a_fresh_ramp_is_found() -> None:
         assert fresh.index(walked.time(index), 59_001) == index
 
 
-def test_times_are_a_copy_that_cannot_harm_the_table() -> None:
+def test_growing_a_table_leaves_the_pieces_handed_out_as_they_were() -> None:
     ramp = Ramp(HarmonicLaw(RATE, 1000, 100), 0)
-    before = ramp.time(5)
-    ramp.times(0, 10)[:] = 0
+    (early,) = ramp.pieces(0, 10)
+    before = early.tolist()
+    ramp.time(HEAD)
     gc.collect()
-    assert ramp.time(5) == before
+    assert early.tolist() == before == times(ramp, 0, 10).tolist()
 
 
-def test_no_times_are_an_empty_array() -> None:
-    assert Ramp(HarmonicLaw(RATE, 1000, 100), 0).times(HEAD + 5, HEAD + 5).size == 0
+def test_of_no_pulses_there_are_no_pieces() -> None:
+    ramp = Ramp(HarmonicLaw(RATE, 1000, 100), 0)
+    for first in (0, HEAD, HEAD + 5):
+        assert list(ramp.pieces(first, first)) == []
+
+
+@pytest.mark.parametrize("first", [HEAD - 2, HEAD - 1, HEAD, HEAD + BLOCK - 1, HEAD + BLOCK])
+def test_pieces_follow_each_other_over_the_seams(first: int) -> None:
+    ramp = Ramp(HarmonicLaw(RATE, 10_000, 1), 0)
+    for count in (1, 2, 3, BLOCK + 2):
+        expected = [ramp.time(index) for index in range(first, first + count)]
+        assert times(ramp, first, first + count).tolist() == expected
 
 
 def test_the_same_parameters_share_a_table() -> None:
