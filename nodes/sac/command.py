@@ -8,7 +8,6 @@ Source: manual, "Command buffer", "Motion", "Continuous", "GAP", "sync"; spec, c
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import replace
 from typing import Final, Protocol, assert_never
 
@@ -124,7 +123,8 @@ class CommandProcessor:
         #: thrown away.
         self._queue: list[Motion | None] = [None] * (QUEUE_LENGTH + 1)
         self._position = 1
-        self._pending: deque[int] = deque()
+        #: Those that wait, in order: a list, since an empty deque takes as much as all else here.
+        self._pending: list[int] = []
         self._current: Motion | None = None
         self._held: Motion | None = None
         #: Where in the queue the held command stands (None: nowhere), and when it was loaded.
@@ -233,7 +233,7 @@ class CommandProcessor:
             # It goes back to the head of what is pending, to be held again; if there is room.
             held, self._held = self._held, None
             if self._held_at is not None and self._queue[self._held_at] is held:
-                self._pending.appendleft(self._held_at)
+                self._pending.insert(0, self._held_at)
             else:
                 self._tell(
                     ReportKind.OVERRUN,
@@ -253,7 +253,7 @@ class CommandProcessor:
         if motion is not None:
             self._preempting = None
         elif self._pending:
-            position = self._pending.popleft()
+            position = self._pending.pop(0)
             motion = self._queue[position]
         if motion is None:
             return

@@ -6,7 +6,6 @@ means is the message processor's business. Figures: ``sacbus.wire.times``.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -100,7 +99,7 @@ class NetworkPort:
         #: While bytes may yet put the answer off: how many (-1: any number), and the body's length.
         self._waits_for: tuple[int, int] | None = None
         #: Packets of its own, each with the earliest time for it.
-        self._outbox: deque[tuple[Ns, bytes]] = deque()
+        self._outbox: list[tuple[Ns, bytes]] = []
         self._sent_until: Ns = 0
         self._deaf_until: Ns = 0
         self.ack = True
@@ -165,7 +164,7 @@ class NetworkPort:
             else:
                 self.naks += 1
         else:
-            data = self._outbox.popleft()[1]
+            data = self._outbox.pop(0)[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
         self._see_what_is_due()
         return data
