@@ -9,6 +9,7 @@ Source: manual, "Command buffer", "Motion", "Continuous", "GAP", "sync"; spec, c
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Final, Protocol, assert_never
 
 from nodes.sac.engine import Engine
@@ -426,6 +427,7 @@ class CommandProcessor:
         self._engine.step(signs.count("+") - signs.count("-"))
 
 
+@lru_cache(maxsize=1_024)
 def shortest(motion: Motion, defaults: Defaults) -> str:
     """A resolved command in the manual's shortest form, with all that shapes its profile.
 

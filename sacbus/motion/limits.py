@@ -54,23 +54,37 @@ class Caution:
 
 
 def harmless(motion: Motion, drive: Drive, start_rpm: Rpm, shares: Shares) -> bool:
-    """True when a glance tells that a command runs into no limit, as nearly all do.
+    """True when a glance tells that a command's pulses run into no limit, as nearly all do.
 
     A whole command that does not come down from a higher speed is nowhere faster than its cruise.
     """
+    least = LINEAR_COMPUTING_US if motion.linear else SHORTEST_PERIOD_US
+    period = drive.cruise_period(motion.cycle_us)
     return (
         not shares.truncated
-        and start_rpm <= motion.rpm <= COARSE_ABOVE_RPM
+        and start_rpm <= motion.rpm
         and drive.pull_in_rpm is None
-        and drive.cruise_period(motion.cycle_us)
-        > TICKS_PER_US * max(LINEAR_COMPUTING_US, drive.pulse_us)
+        and period >= TICKS_PER_US * least
+        and period > TICKS_PER_US * drive.pulse_us
     )
+
+
+def of_velocity(motion: Motion, drive: Drive) -> Iterator[Caution]:
+    """Whether the velocity of a command could be said better."""
+    if motion.rpm <= COARSE_ABOVE_RPM:
+        return
+    cycle_us = 60_000_000 // (drive.steps_per_rev * motion.rpm)
+    if motion.cycle_us == cycle_us:
+        yield Caution(
+            Limit.COARSE,
+            f"V{motion.rpm} is coarser than a cycle; VC{cycle_us} says the same and can be tuned",
+        )
 
 
 def cautions(
     motion: Motion, drive: Drive, start_rpm: Rpm, shares: Shares, course: Course
 ) -> Iterator[Caution]:
-    """All that a planned command runs into."""
+    """All that the pulses of a planned command run into."""
     legs = course.legs
     if not legs:
         return
@@ -91,12 +105,6 @@ def cautions(
             )
         yield from _of_fall(drive, start_rpm, course)
     yield from _of_motor(drive, start_rpm, course)
-    cycle_us = 60_000_000 // (drive.steps_per_rev * motion.rpm) if motion.rpm else 0
-    if motion.rpm > COARSE_ABOVE_RPM and motion.cycle_us == cycle_us:
-        yield Caution(
-            Limit.COARSE,
-            f"V{motion.rpm} is coarser than a cycle; VC{cycle_us} says the same and can be tuned",
-        )
 
 
 def _of_fastest(period: int, drive: Drive) -> Iterator[Caution]:
