@@ -230,8 +230,8 @@ def test_when_nobody_reads_its_output_any_more_serve_ends_in_order(tmp_path: Pat
         assert sacbus.process.stdout is not None
         sacbus.process.stdout.close()
         with client(str(port)) as line:
-            line.write(encode(10, 1, b"?"))
-            line.write(encode(10, 1, b"?"))
+            # In one go: upon the first report the other end may be closed already.
+            line.write(encode(10, 1, b"?") * 2)
             assert sacbus.process.wait(30) == 1
         assert sacbus.errors() == ""
     assert list(tmp_path.iterdir()) == []
