@@ -6,6 +6,8 @@ terminal and this in another:
     make serve
     python examples/first_contact.py /tmp/sacbus
 
+A URL of pyserial's does as well, for a bus on TCP: socket://127.0.0.1:7000, or rfc2217://.
+
 It sends a command to node 10, a damaged packet, a broadcast, and a command to nobody, and prints
 what came back. Node 10's motor makes 400 full steps, two turns. The status is 0 when every answer
 was the one expected, 1 when one was not, 2 when the port cannot be opened.
@@ -96,8 +98,10 @@ def main(argv: Sequence[str]) -> int:
     broadcast = packet(EVERYBODY, b"y")
 
     try:
-        # 8 data bits, no parity, 1 stop bit. Exclusive: two readers would share the answers.
-        port = serial.Serial(path, 38_400, exclusive=True)
+        # 8 data bits, no parity, 1 stop bit. Two readers of one serial port would share the
+        # answers, so it is for us alone; a bus behind a URL is for everybody.
+        alone = None if "://" in path else True
+        port = serial.serial_for_url(path, 38_400, exclusive=alone)
     except serial.SerialException as fault:
         why = os.strerror(fault.errno) if fault.errno else fault
         print(f"error: cannot open the port ({why}), {path}, is the bus running?", file=sys.stderr)

@@ -89,6 +89,37 @@ def test_options_reach_the_bus() -> None:
             assert port.read(len(packet) + 4) == packet + ACK_10
 
 
+SETS_9600 = """
+import sys, serial
+with serial.serial_for_url(sys.argv[1], 9600, timeout=30) as port:
+    port.write(bytes.fromhex("02 0a 01 76 31 30 30 03 47 00"))
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("option", [("--rfc2217", "0"), ()], ids=["rfc2217", "pty"])
+def test_a_program_at_a_wrong_rate_is_named_in_the_log_and_does_nothing(
+    option: tuple[str, ...],
+) -> None:
+    with served("--ephemeral", *option) as sacbus:
+        (link,) = sacbus.ready["links"]
+        where = link.get("url") or link["path"]
+        with subprocess.Popen(
+            [sys.executable, "-W", "ignore", "-c", SETS_9600, where], stdin=subprocess.PIPE
+        ) as program:
+            report = sacbus.read_event("report")
+            assert program.stdin is not None
+            program.stdin.close()
+            assert program.wait(PATIENCE) == 0
+        assert (report["node"], report["what"]) == (None, "warning")
+        assert where in report["text"]
+        assert "has set 9600 baud, the line runs at 38400: bytes arrive garbled" in report["text"]
+        assert sacbus.send_signal(signal.SIGTERM) == 0
+        (bus,) = sacbus.read_event("stopped")["buses"]
+        assert bus["bytes"] == 10
+        assert [node["packets"] for node in bus["nodes"]] == [0, 0, 0]
+
+
 @pytest.mark.parametrize(
     ("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0), (signal.SIGHUP, 129)]
 )

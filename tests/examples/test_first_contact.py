@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import asyncio
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -53,6 +54,16 @@ def test_a_bus_behind_a_path_answers_as_told(
         (bus,) = stopped["buses"]
         assert (bus["transmissions"], bus["collided"]) == (8, 0)
         assert bus["reports"] == {"lost": 1}  # the packet with a wrong CRC
+
+
+@pytest.mark.parametrize("way", ["tcp", "rfc2217"])
+def test_a_bus_behind_a_url_answers_a_program_of_its_own_as_told(way: str) -> None:
+    with served("--ephemeral", f"--{way}", "0") as sacbus:
+        (link,) = sacbus.ready["links"]
+        assert (link["kind"], link["host"]) == (way, "127.0.0.1")
+        program = [sys.executable, first_contact.__file__, link["url"]]
+        done = subprocess.run(program, capture_output=True, text=True, timeout=60, check=False)
+        assert (done.returncode, done.stdout) == (0, EXPECTED)
 
 
 def test_what_it_sends_moves_the_motor_400_steps_and_no_other() -> None:
