@@ -413,6 +413,7 @@ class CommandProcessor:
             motion,
             rpm=session.rpm,
             cycle_us=session.cycle_us,
+            by_cycle=session.by_cycle,
             acc100=session.acc100,
             linear=session.linear,
         )

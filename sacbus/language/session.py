@@ -8,7 +8,7 @@ Source: manual, "System defaults", "Session defaults", "Motion", "V"; spec, "Mot
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Self
 
 from .commands import BARE, Acceleration, Bare, Deceleration, Move, Velocity
@@ -26,7 +26,8 @@ class Motion:
     steps: full steps, or pulses when ``pulses`` is True; None = continuous. rpm: integer, 0 when
     the cycle is longer than that of 1 RPM. cycle_us: of the target, per full step, >= 1; what
     cruise uses. acc100, dec100: hundredths, 1 to 99900 (= 999, no ramp), in RPM per full step
-    (harmonic) or rad/s2 (linear). extra_pulses 0 to 255, wait_us 32 bits.
+    (harmonic) or rad/s2 (linear). extra_pulses 0 to 255, wait_us 32 bits. by_cycle: the velocity
+    is known to have been given as a cycle, which may be the very one of its RPM.
     """
 
     steps: int | None
@@ -40,6 +41,7 @@ class Motion:
     wait_us: int = 0
     sync: bool = False
     pulses: bool = False
+    by_cycle: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +90,8 @@ _FACTORY: Final = Defaults()
 class Session:
     """The session defaults: what a command that leaves something out is given.
 
-    rpm and cycle_us are one velocity, acc100 and dec100 belong to the ramp ``linear``; full_step
-    is $F (True) or $P.
+    rpm and cycle_us are one velocity, by_cycle as in :class:`Motion`; acc100 and dec100 belong to
+    the ramp ``linear``; full_step is $F (True) or $P.
     """
 
     rpm: int = 100
@@ -99,6 +101,7 @@ class Session:
     linear: bool = _FACTORY.linear
     full_step: bool = _FACTORY.full_step
     defaults: Defaults = _FACTORY
+    by_cycle: bool = field(default=True, compare=False)
 
     @classmethod
     def start(cls, defaults: Defaults) -> Self:
@@ -136,7 +139,7 @@ class Session:
             acc100 = defaults.acc_of(linear=linear)
         if dec100 is None or dec100 is BARE:
             dec100 = defaults.dec_of(linear=linear)
-        rpm, cycle_us = self._velocity(move.rpm, move.cycle_us)
+        rpm, cycle_us, by_cycle = self._velocity(move.rpm, move.cycle_us)
         pulses = move.pulses
         motion = _make_motion(
             move.steps or None,
@@ -150,34 +153,45 @@ class Session:
             move.wait_us or 0,
             move.sync or False,
             not self.full_step if pulses is None else pulses,
+            by_cycle,
         )
         if not move.steps or (
             cycle_us == self.cycle_us
             and rpm == self.rpm
+            and by_cycle is self.by_cycle
             and acc100 == self.acc100
             and dec100 == self.dec100
             and linear is self.linear
         ):
             return motion, self
-        after = _make_session(rpm, cycle_us, acc100, dec100, linear, self.full_step, defaults)
+        after = _make_session(
+            rpm, cycle_us, acc100, dec100, linear, self.full_step, defaults, by_cycle
+        )
         return motion, after
 
-    def _velocity(self, rpm: int | Bare | None, cycle_us: int | None) -> tuple[int, int]:
-        """RPM and cycle of a velocity as given; of the session when none was."""
+    def _velocity(self, rpm: int | Bare | None, cycle_us: int | None) -> tuple[int, int, bool]:
+        """RPM and cycle of a velocity as given, and whether as a cycle; the session's when not."""
         defaults = self.defaults
         if cycle_us is not None:
-            return defaults.rpm_of(cycle_us), cycle_us
+            return defaults.rpm_of(cycle_us), cycle_us, True
         if rpm is None:
-            return self.rpm, self.cycle_us
+            return self.rpm, self.cycle_us, self.by_cycle
         if rpm is BARE:
-            return defaults.rpm_of(defaults.cycle_us), defaults.cycle_us
-        return rpm, defaults.cycle_of(rpm)
+            return defaults.rpm_of(defaults.cycle_us), defaults.cycle_us, True
+        return rpm, defaults.cycle_of(rpm), False
 
     def with_velocity(self, velocity: Velocity) -> Session:
         """After ``V``: RPM and cycle follow each other, the one given is exact."""
-        rpm, cycle_us = self._velocity(velocity.rpm, velocity.cycle_us)
+        rpm, cycle_us, by_cycle = self._velocity(velocity.rpm, velocity.cycle_us)
         return _make_session(
-            rpm, cycle_us, self.acc100, self.dec100, self.linear, self.full_step, self.defaults
+            rpm,
+            cycle_us,
+            self.acc100,
+            self.dec100,
+            self.linear,
+            self.full_step,
+            self.defaults,
+            by_cycle,
         )
 
     def with_acceleration(self, acceleration: Acceleration) -> Session:

@@ -71,7 +71,7 @@ def harmless(motion: Motion, drive: Drive, start_rpm: Rpm, shares: Shares) -> bo
 
 def of_velocity(motion: Motion, drive: Drive) -> Iterator[Caution]:
     """Whether the velocity of a command could be said better."""
-    if motion.rpm <= COARSE_ABOVE_RPM:
+    if motion.rpm <= COARSE_ABOVE_RPM or motion.by_cycle:
         return
     cycle_us = 60_000_000 // (drive.steps_per_rev * motion.rpm)
     if motion.cycle_us == cycle_us:

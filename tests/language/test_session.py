@@ -120,6 +120,33 @@ def test_bare_unaries_bring_back_the_defaults_of_the_present_ramp() -> None:
     assert Session(7, 8, 9, 10).with_deceleration(Deceleration()).dec100 == 100
 
 
+@pytest.mark.parametrize(
+    ("lines", "by_cycle"),
+    [
+        (["m1"], True),  # the default velocity is a cycle
+        (["m1v625"], False),
+        (["m1vc480"], True),
+        (["m1v625", "m1"], False),
+        (["m1v625", "m1vc480", "m1"], True),
+        (["m1vc480", "m1v"], True),
+        (["v625", "m1"], False),
+        (["v625", "vc480", "m"], True),
+    ],
+)
+def test_a_velocity_is_known_to_be_a_cycle_even_where_it_is_that_of_an_rpm(
+    lines: list[str], by_cycle: bool
+) -> None:
+    # 480 us are 625 RPM exactly.
+    session = FACTORY
+    for line in lines[:-1]:
+        command = parse(line).command
+        if isinstance(command, Velocity):
+            session = session.with_velocity(command)
+        else:
+            _, session = resolved(line, session)
+    assert resolved(lines[-1], session)[0].by_cycle is by_cycle
+
+
 def test_a_unary_cycle_sets_the_rpm_too() -> None:
     after = FACTORY.with_velocity(Velocity(None, 4567))
     assert (after.rpm, after.cycle_us) == (65, 4567)

@@ -63,6 +63,9 @@ def limits(motion: Motion, drive: Drive = FACTORY, start: int = 0) -> set[Limit]
         # manual, "V": above 600 RPM better a cycle
         pytest.param(command(9000, 700), FACTORY, 0, {Limit.COARSE}, id="v700"),
         pytest.param(replace(command(9000, 700), cycle_us=430), FACTORY, 0, set(), id="vc430"),
+        pytest.param(
+            replace(command(9000, 700), by_cycle=True), FACTORY, 0, set(), id="vc428, which is v700"
+        ),
         pytest.param(command(9000, 600), FACTORY, 0, set(), id="v600"),
         pytest.param(
             replace(command(9000, 1), rpm=0, cycle_us=400_000),
