@@ -8,13 +8,14 @@ import platform
 from collections.abc import Callable
 from dataclasses import asdict
 
-from benchmarks import bus, kernel, lateness, line, pty, tcp, wire
+from benchmarks import bus, kernel, lateness, line, motion, pty, tcp, wire
 from benchmarks.figure import Figure
 from sacbus.wire import CRC_IS_FAST
 
 BENCHMARKS: dict[str, Callable[[int], list[Figure]]] = {
     "wire": wire.figures,
     "kernel": kernel.figures,
+    "motion": motion.figures,
     "bus": bus.figures,
     "line": line.figures,
     "pty": pty.figures,

@@ -90,7 +90,7 @@ class CommandProcessor:
         "_held_at",
         "_held_loaded",
         "_kept_rpm",
-        "_last_acc",
+        "_last",
         "_last_end",
         "_last_period",
         "_pending",
@@ -138,7 +138,8 @@ class CommandProcessor:
         self._kept_rpm: Rpm = 0
         self._last_end: Ns = 0
         self._last_period = 0
-        self._last_acc = (-1, -1, False)
+        #: The command that was loaded last.
+        self._last: Motion | None = None
         self._stopping = False
         #: When the command that runs is over, or its start is to be told; None: never.
         self.due: Ns | None = None
@@ -258,9 +259,8 @@ class CommandProcessor:
             motion = self._queue[position]
         if motion is None:
             return
-        acc = (motion.acc100, motion.dec100, motion.linear)
-        load = self._engine.processing(load_ticks(acc != self._last_acc))
-        self._last_acc = acc
+        load = self._engine.processing(load_ticks(_changes_acceleration(self._last, motion)))
+        self._last = motion
         loaded = max(now, self._free) + load
         if motion.sync:
             self._held = motion
@@ -426,6 +426,15 @@ class CommandProcessor:
             )
             return
         self._engine.step(signs.count("+") - signs.count("-"))
+
+
+def _changes_acceleration(last: Motion | None, motion: Motion) -> bool:
+    return (
+        last is None
+        or motion.acc100 != last.acc100
+        or motion.dec100 != last.dec100
+        or motion.linear != last.linear
+    )
 
 
 @lru_cache(maxsize=1_024)

@@ -47,6 +47,12 @@ class _Left(NamedTuple):
     stalled: bool = False
 
 
+#: What most engines hold most of the time, one for all of them.
+_AT_ZERO: Final = Where()
+_AT_REST: Final = _Left()
+_FROM_REST: Final = Entry()
+
+
 class Engine:
     """One motor.
 
@@ -73,16 +79,16 @@ class Engine:
         #: What pulses are timed by. :meth:`set_clock` changes it.
         self.clock = external or oscillator
         #: Where the present profile's pulse 0 goes on from.
-        self._rest = Where()
+        self._rest = _AT_ZERO
         self._profile: Profile | None = None
         self._sign = 1
         #: An instant, and the profile's tick then: negative while the start wait runs.
         self._anchor: Ns = 0
         self._tick = 0
-        self._left = _Left()
+        self._left = _AT_REST
         #: How the motor comes into the present profile, and where it does not follow that; None:
         #: not looked at yet.
-        self._entry = Entry()
+        self._entry = _FROM_REST
         self._slips: list[Slip] | None = None
         #: When the present profile's first pulse is issued, it may be to come; None: never, as long
         #: as the clock stands still.
@@ -140,7 +146,7 @@ class Engine:
             return
         # Only continuous motion has no number of pulses, and that has no end to come to.
         pulses = profile.pulses or 0
-        self._left = _Left()
+        self._left = _AT_REST
         if profile.kept_rpm and profile.drive.pull_in_rpm is not None:
             entry = self._entry_after(profile, pulses)
             # It turns on for a period; what begins within that does not begin from rest.
@@ -220,7 +226,7 @@ class Engine:
             self.started = self._anchor + span(-tick)
             left = self._left
             turns = left.rpm and self.started <= left.until
-            self._entry = Entry(self._sign * left.rpm, left.stalled) if turns else Entry()
+            self._entry = Entry(self._sign * left.rpm, left.stalled) if turns else _FROM_REST
         duration = self._profile.duration
         if duration is not None:
             self.end = self._anchor + span(duration - tick)

@@ -64,6 +64,7 @@ _NOT_ZERO: Final[Mapping[str, int]] = {
 
 #: One for all nodes that are alike: what is worked out for one then serves them all.
 _drive = lru_cache(maxsize=256)(Drive)
+_defaults = lru_cache(maxsize=256)(Defaults)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +117,8 @@ class Memory:
         return asdict(self)
 
     def defaults(self) -> Defaults:
-        """The system defaults that a session starts from."""
-        return Defaults(
+        """The system defaults that a session starts from; one object for the same values."""
+        return _defaults(
             cycle_us=self.cycle,
             acc100=self.acc,
             dec100=self.dec,

@@ -28,6 +28,19 @@ class SacNode:
 
     kind = "sac"
 
+    __slots__ = (
+        "_commands",
+        "_engine",
+        "_memory",
+        "_messages",
+        "_network",
+        "_now",
+        "_rate",
+        "_settings",
+        "_tell_bus",
+        "_xclk_hz",
+    )
+
     def __init__(
         self, address: int, settings: SacSettings, rate: LineRate, tell: Callable[[Report], None]
     ) -> None:

@@ -6,6 +6,7 @@ Owns the search for the leg that runs. Times in ticks, pulses, and *travel* in f
 
 from bisect import bisect_right
 from collections.abc import Iterable
+from itertools import accumulate
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -43,14 +44,13 @@ class Course:
             if leg.count is not None and leg.ticks is not None:
                 before.append(before[-1] + leg.count)
                 began.append(began[-1] + leg.ticks)
-        went = before  # where every pulse is a finest microstep, travel is the number of pulses
+        self.began: Final = tuple(began)
+        self.before: Final = tuple(before)
+        # Where every pulse is a finest microstep, travel is the number of pulses.
+        self.went = self.before
         if any(leg.weight != 1 for leg in self.legs):
-            went = [0]
-            for leg in self.legs[: len(before) - 1]:
-                went.append(went[-1] + (leg.count or 0) * leg.weight)
-        self.began: Final = began
-        self.before: Final = before
-        self.went: Final = went
+            steps = ((leg.count or 0) * leg.weight for leg in self.legs[: len(before) - 1])
+            self.went = tuple(accumulate(steps, initial=0))
 
     @property
     def pulses(self) -> int | None:

@@ -6,6 +6,7 @@ Source: manual, "Timing", "clock", "xclk"; spec, "Units and clock".
 """
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import gcd
 from typing import Final, Self
 
@@ -42,6 +43,7 @@ class Timebase:
         derive(self, "runs", self.ticks > 0)
 
     @classmethod
+    @lru_cache(maxsize=256)  # one for all nodes that are alike
     def internal(cls, ppm: int = 0) -> Self:
         """The node's own oscillator, whose frequency is `ppm` parts in a million too high."""
         return cls(NS_PER_TICK * MILLION, MILLION + ppm)
