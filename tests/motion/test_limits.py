@@ -136,6 +136,11 @@ def test_a_stall_is_told_with_its_pulse() -> None:
 
 
 def test_in_a_coarse_gear_a_fall_is_told_by_full_steps_all_the_same() -> None:
-    for start, expected in ((300, {Limit.FALL}), (0, {Limit.TARGET})):
-        drive = Drive(ustep=4, auto_micro=True)
-        assert limits(command(20, 300, 10, 10), drive, start) == expected
+    drive = Drive(ustep=4, auto_micro=True)
+    # Of 27 steps, deceleration sets in at 278 RPM: more than a step of 10 below 300. Not so of 28.
+    for steps, start, expected in (
+        (27, 300, {Limit.FALL}),
+        (28, 300, set()),
+        (20, 0, {Limit.TARGET}),
+    ):
+        assert limits(command(steps, 300, 10, 10), drive, start) == expected

@@ -122,6 +122,23 @@ def test_a_weak_stretch_of_the_curve_is_met_on_the_way() -> None:
     assert until is None
 
 
+def test_a_curve_that_rises_lets_a_motor_that_has_stalled_come_along() -> None:
+    drive = Drive(pull_in_rpm=250, pull_out=((100, 10), (300, 90), (900, 90)))
+    profile = plan(command(9_000, 600, 50, 999, linear=True), drive)
+    ((first, until),) = where(profile)
+    assert first == 0
+    assert until is not None
+    # 10 + 0.4 (v - 100) = 50
+    assert profile.velocity_at(profile.time_of(until)) == pytest.approx(200, rel=0.01)
+
+
+def test_a_single_pulse_beyond_the_curve_is_one_too_many() -> None:
+    drive = Drive(pull_in_rpm=160, pull_out=((150, 9_000),))
+    profile = plan(command(900, 152), drive)
+    # Up to 151 RPM, 152, and down from 151.
+    assert where(profile) == [(141, 900 - 141)]
+
+
 def test_beyond_the_last_speed_of_the_curve_nothing_turns() -> None:
     profile = plan(command(40_000, 700, 5, 999, linear=True), STRONG)
     ((first, until),) = where(profile)

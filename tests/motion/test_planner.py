@@ -164,8 +164,9 @@ def test_zero_acceleration_acts_as_none() -> None:
     # spec, "Division by nothing"
     assert shares(plan(command(200, 100, 0, 0), FACTORY)) == (0, 200, 0)
     assert shares(plan(command(200, 100, 0, 0, linear=True), FACTORY)) == (0, 200, 0)
-    assert plan(command(200, 100, 1, 0), FACTORY).kept_rpm == 100
-    assert plan(command(200, 100, 1, 0, linear=True), FACTORY).kept_rpm == 100
+    for _ in range(2):  # the second time from memory
+        assert plan(command(200, 100, 1, 0), FACTORY).kept_rpm == 100
+        assert plan(command(200, 100, 1, 0, linear=True), FACTORY).kept_rpm == 100
 
 
 def test_a_speed_of_32_bits_is_planned_at_once() -> None:

@@ -262,11 +262,13 @@ def test_clk_falls_where_the_next_pulse_is_beyond_an_array() -> None:
     assert profile.clk_falls(0, 100).tolist() == [2]
 
 
-def test_the_tail_of_continuous_motion_goes_on_as_the_whole() -> None:
-    profile = plan(command(None, 100), Drive(ustep=2))
-    for rpm in (300, 50, 200):
-        profile = profile.retarget(profile.time_of(500) + rpm, command(None, rpm, 5))
-    for at in (0, profile.time_of(3), profile.time_of(501), 10**9):
+@pytest.mark.parametrize("linear", [False, True])
+def test_the_tail_of_continuous_motion_goes_on_as_the_whole(linear: bool) -> None:
+    profile = plan(command(None, 200, 20, linear=linear), Drive(ustep=2))
+    for pulse, rpm in ((902, 300), (5_001, 50)):
+        other = command(None, rpm, 20, linear=linear)
+        profile = profile.retarget(profile.time_of(pulse) + 9, other)
+    for at in (0, *(profile.time_of(pulse) for pulse in (3, 22, 906, 5_001, 5_033)), 10**9):
         first, tail = profile.tail(at)
         begin = profile.time_of(first)
         assert first % 4 == 0
