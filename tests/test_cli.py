@@ -127,6 +127,11 @@ WRONG = [
     (["serve", "--set", "ustep"], 2, "expected NAME=VALUE, got 'ustep'"),
     (["serve", "--set", "ustep=9", "--ephemeral"], 1, "expected a whole number from 0 to 7, got 9"),
     (["serve", "--set", "soft_ops=7", "--ephemeral"], 1, "expected true or false, got 7"),
+    (
+        ["serve", "--set", "ustep=-1", "--ephemeral"],
+        1,
+        "expected a whole number from 0 to 7, got -1",
+    ),
     (["serve", "--set", "colour=red", "--ephemeral"], 1, "setting 'colour': expected one of"),
     (["serve", "--receiver", "deaf"], 2, "'deaf' is not one of"),
     (["serve", "--kind", "toaster", "--ephemeral"], 1, "'toaster' is not installed"),

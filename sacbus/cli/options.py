@@ -86,5 +86,6 @@ def read_settings(
         if value.lower() in ("true", "false"):
             settings[name] = value.lower() == "true"
         else:
-            settings[name] = int(value) if value.isascii() and value.isdecimal() else value
+            digits = value.removeprefix("-")
+            settings[name] = int(value) if digits.isascii() and digits.isdecimal() else value
     return settings
