@@ -197,14 +197,15 @@ def test_no_steps_are_no_motion() -> None:
     steps=st.integers(1, 3_000),
     extra=st.integers(0, 255),
     start=st.integers(0, 99),
+    auto=st.booleans(),
 )
 def test_what_a_drive_remembers_of_ramps_changes_no_plan(
-    first: Motion, steps: int, extra: int, start: int
+    first: Motion, steps: int, extra: int, start: int, auto: bool
 ) -> None:
-    drive = Drive(ustep=2)
+    drive = Drive(ustep=2, auto_micro=auto)
     plan(first, drive, start)
     second = replace(first, steps=steps, extra_pulses=extra)
-    known, fresh = plan(second, drive, start), plan(second, Drive(ustep=2), start)
+    known, fresh = plan(second, drive, start), plan(second, replace(drive), start)
     assert (known.shares, known.duration, known.kept_rpm) == (
         fresh.shares,
         fresh.duration,

@@ -826,6 +826,15 @@ def test_soft_ops_of_others_are_no_unknown_commands_and_are_never_answered() -> 
 # ---- what is obeyed all the same ----------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("line", "warned"), [("v625", 1), ("vc480", 0)])
+def test_a_new_velocity_is_warned_of_as_it_was_given(line: str, warned: int) -> None:
+    bench = Bench()
+    bench.hears("mv100a999d999", at=AT)
+    bench.hears(line, at=SECOND)
+    assert bench.snapshot(2 * SECOND).rpm == 625
+    assert len(bench.told(ReportKind.WARNING)) == warned
+
+
 def test_what_the_hardware_may_not_be_able_to_do_is_obeyed_and_warned_of() -> None:
     bench = Bench()
     bench.hears("m2000v700a5d5", at=AT)
