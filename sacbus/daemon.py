@@ -11,12 +11,11 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import ExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from math import inf
 from pathlib import Path
 from random import Random
-from typing import assert_never
+from typing import Final, assert_never
 
-from sacbus.bus import LATENCY, PLAIN_BITS, Bus, LivePort, Port
+from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, LivePort, Port
 from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
 from sacbus.kernel import US, Kernel, LineRate, Ns
 from sacbus.links import Link, Tuning
@@ -35,7 +34,11 @@ from sacbus.node import (
 )
 from sacbus.state import StateDirectory, StateError
 
-__all__ = ["Configuration", "HostedBus", "NodeAt", "check", "open_bus"]
+__all__ = ["FASTEST", "SLOWEST", "Configuration", "HostedBus", "NodeAt", "check", "open_bus"]
+
+#: Bus seconds in a second: beyond these, times in seconds are no numbers any more.
+SLOWEST: Final = 1e-6
+FASTEST: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +92,8 @@ class HostedBus:
         self.links: list[Link | Server] = []
         #: Everyone with a port of their own: programs, adapters, mothers.
         self._ports: list[Port | LivePort] = []
+        #: Ports of programs that have left, which may have something to send yet.
+        self._leaving: list[Port] = []
         self._mothers: list[Mother] = []
         #: Nodes in the order of the configuration, whose addresses name their memory.
         self._configured = tuple(zip(configuration.every_node, bus.nodes, strict=True))
@@ -114,8 +119,7 @@ class HostedBus:
 
     def tell(self, text: str) -> None:
         """Report something about the line or a link, now."""
-        kernel = self.host.kernel
-        self.bus.tell(Report(kernel.now, None, ReportKind.WARNING, text))
+        self.bus.tell(Report(self.now(), None, ReportKind.WARNING, text))
 
     def attach(self, link: Link, *, echo: bool = False, latency: Ns = LATENCY) -> Port:
         """Open a link, put its bytes on the line, and the line's on the link.
@@ -132,9 +136,16 @@ class HostedBus:
         def deliver(data: bytes) -> None:
             self.host.arrive(port.talk, data)
 
-        link.open(deliver)
+        def hold(held: bool) -> None:
+            link.hold(held=held)
+
+        port = LivePort(self.bus.medium, link.send, name=link.where, hold=hold)
+        try:
+            link.open(deliver)
+        except BaseException:
+            port.close()
+            raise
         self.links.append(link)
-        port = LivePort(self.bus.medium, link.send, name=link.where)
         self._ports.append(port)
         return port
 
@@ -148,13 +159,22 @@ class HostedBus:
             port = self._seat(link, echo=echo, latency=latency)
 
             def gone() -> None:
-                port.leave()
                 self._ports.remove(port)
+                self._let_go(port)
 
             return gone
 
         await server.open(admit)
         self.links.append(server)
+
+    def _let_go(self, port: Port) -> None:
+        """Have a port send to its end what its program had said, unless many have left so much."""
+        self._leaving = [one for one in self._leaving if one.unsent]
+        if sum(one.unsent for one in self._leaving) + port.unsent > FULL:
+            port.close()
+        else:
+            port.leave()
+            self._leaving.append(port)
 
     def _seat(self, link: Link, *, echo: bool, latency: Ns) -> Port:
         rate = self.bus.rate
@@ -174,12 +194,17 @@ class HostedBus:
             ninth = tuning.ninth()
             arrive(port.talk, tuning.from_client(data), 1 if ninth is None else ninth)
 
-        link.open(deliver_nine if rate.bits > PLAIN_BITS else deliver)
-
         def hold(held: bool) -> None:
             link.hold(held=held)
 
-        port = Port(self.bus.medium, hear, latency=latency, echo=echo, name=link.where, hold=hold)
+        port = Port(self.bus.medium, hear, latency=latency, echo=echo, hold=hold)
+        try:
+            # A quick program's bytes may be delivered before this comes back.
+            link.open(deliver_nine if rate.bits > PLAIN_BITS else deliver)
+        except BaseException:
+            port.close()
+            raise
+        port.name = link.where  # of a pty without a symlink known only now
         self._ports.append(port)
         return port
 
@@ -207,7 +232,7 @@ class HostedBus:
             stack.callback(self.host.close)
             for mother in self._mothers:
                 stack.callback(mother.lose, "the bus is closed")
-            for port in self._ports:
+            for port in (*self._ports, *self._leaving):
                 stack.callback(port.close)
             for link in self.links:
                 stack.callback(link.close)
@@ -317,8 +342,10 @@ def check(configuration: Configuration) -> Protocol:
 
     SettingError or KindError for the first mistake; otherwise the protocol that all nodes speak.
     """
-    if not 0 < configuration.speed < inf:
-        raise SettingError(f"speed: expected a number above 0, got {configuration.speed}")
+    if not SLOWEST <= configuration.speed <= FASTEST:
+        raise SettingError(
+            f"speed: expected a number from {SLOWEST:f} to {FASTEST:.0f}, got {configuration.speed}"
+        )
     if configuration.baud is not None and not 300 <= configuration.baud <= 4_000_000:
         raise SettingError(f"baud: expected 300 to 4000000, got {configuration.baud}")
     if configuration.lanes not in (None, 1, 2):
@@ -349,4 +376,9 @@ def check(configuration: Configuration) -> Protocol:
             )
         if not configuration.pace:
             raise SettingError("pace: expected true with a real adapter, which keeps real time")
+        if protocol.rate.bits > PLAIN_BITS:
+            raise SettingError(
+                f"links: an adapter hears no ninth bits, which {protocol.name} has; use a pty, TCP "
+                "or RFC 2217"
+            )
     return protocol

@@ -103,13 +103,17 @@ class Lines:
 class Json(Lines):
     """One JSON object a line."""
 
+    _ways: list[list[dict[str, object]]]
+
     def ready(self) -> None:
         """First of all, ``ready``; every link once for all buses, and again with its bus."""
+        # Where a link was is not known any more once it is closed.
+        self._ways = [_links(bus) for bus in self._buses]
         self._write(
             {
                 "event": "ready",
                 "version": __version__,
-                "links": [link for bus in self._buses for link in _links(bus)],
+                "links": [way for ways in self._ways for way in ways],
                 "terminals": {},
                 "buses": [
                     {
@@ -120,9 +124,9 @@ class Json(Lines):
                             {"node": one.address, "kind": one.kind}
                             for one in bus.configuration.every_node
                         ],
-                        "links": _links(bus),
+                        "links": ways,
                     }
-                    for bus in self._buses
+                    for bus, ways in zip(self._buses, self._ways, strict=True)
                 ],
             }
         )
@@ -156,7 +160,14 @@ class Json(Lines):
 
     def stopped(self) -> None:
         """Last of all, ``stopped``."""
-        self._write({"event": "stopped", "buses": [_ended(bus) for bus in self._buses]})
+        self._write(
+            {
+                "event": "stopped",
+                "buses": [
+                    _ended(bus, ways) for bus, ways in zip(self._buses, self._ways, strict=True)
+                ],
+            }
+        )
 
     def missed(self, count: int) -> str:
         """As its own event."""
@@ -278,10 +289,15 @@ def _link(link: Link | Server) -> dict[str, object]:
     if not separator:
         return {"kind": link.kind, "path": link.where}
     host, _, port = rest.rpartition(":")
-    return {"kind": link.kind, "url": f"{scheme}://{rest}", "host": host, "port": int(port)}
+    return {
+        "kind": link.kind,
+        "url": f"{scheme}://{rest}",
+        "host": host.strip("[]"),
+        "port": int(port),
+    }
 
 
-def _ended(bus: HostedBus) -> dict[str, Any]:
+def _ended(bus: HostedBus, ways: list[dict[str, object]]) -> dict[str, Any]:
     counters = bus.bus.medium.counters()
     lateness = bus.host.lateness
     return {
@@ -298,10 +314,10 @@ def _ended(bus: HostedBus) -> dict[str, Any]:
         },
         "links": [
             {
-                **_link(link),
+                **way,
                 **{name: getattr(link.counters, name) for name in link.counters.__slots__},
             }
-            for link in bus.links
+            for link, way in zip(bus.links, ways, strict=True)
         ],
         "nodes": [
             {

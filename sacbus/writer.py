@@ -7,6 +7,7 @@ that stops reading would stop the bus, its signals included. A leaf beside the c
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import io
 import os
 import queue
@@ -94,8 +95,8 @@ class Writer:
 
     def _tell(self, callback: Callable[..., object], *arguments: object) -> None:
         """Have the loop call back."""
-        # It may be closed already, when the last lines go to nobody.
-        if not self._loop.is_closed():
+        # It may be closed already, or just now, when the last lines go to nobody.
+        with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(callback, *arguments)
 
     def _write(self, text: str) -> None:

@@ -20,6 +20,7 @@ from sacbus.kernel import MS, SECOND, Kernel, LineRate, Ns
 from sacbus.links import LinkError, MemoryLink, PathTaken, PtyLink
 from sacbus.links.places import PtyAt
 from sacbus.links.rfc2217 import Rfc2217Server
+from sacbus.links.tcp import TcpServer
 from sacbus.mother import LineLost, Mother
 from sacbus.node import Heard, KindError, SettingError, find_kind
 from sacbus.state import StateDirectory, StateError
@@ -496,8 +497,8 @@ def test_every_link_is_closed_with_its_bus(tmp_path: Path) -> None:
     [
         ({"nodes": (3,)}, "nodes: expected addresses from 4 to 255, got 3"),
         ({"nodes": (10, 11, 10)}, "nodes: expected every address once, got 10 twice"),
-        ({"speed": float("nan")}, "speed: expected a number above 0"),
-        ({"speed": float("inf")}, "speed: expected a number above 0"),
+        ({"speed": float("nan")}, "speed: expected a number from 0.000001 to 1000000"),
+        ({"speed": float("inf")}, "speed: expected a number from 0.000001 to 1000000"),
         ({"baud": 0}, "baud: expected 300 to 4000000, got 0"),
         ({"lanes": 3}, "lanes: expected 1 or 2, got 3"),
     ],
@@ -571,7 +572,9 @@ def test_a_link_that_cannot_be_closed_is_told_and_keeps_nothing_else_open(tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:set(Daemon|Name).. is deprecated:DeprecationWarning")  # pyserial's
+@pytest.mark.filterwarnings(
+    "ignore:set(Daemon|Name).. is deprecated:DeprecationWarning"
+)  # pyserial's
 def test_mark_and_space_parity_over_rfc_2217_set_the_ninth_bits_on_a_line_that_has_some() -> None:
     rate = LineRate(9_600, bits=11)
 
@@ -613,3 +616,73 @@ def test_mark_and_space_parity_over_rfc_2217_set_the_ninth_bits_on_a_line_that_h
         assert bus.report_counts == {}
 
     asyncio.run(scene())
+
+
+class Quick(MemoryLink):
+    """Whose program has said something before `open` comes back, as a pty's may."""
+
+    def open(self, deliver: Callable[[bytes], None]) -> None:
+        super().open(deliver)
+        deliver(encode(10, 1, b"v1"))
+
+
+class Refused(MemoryLink):
+    def open(self, deliver: Callable[[bytes], None]) -> None:
+        raise LinkError("no such thing", "nowhere", "do without")
+
+
+def test_what_a_program_says_while_its_link_is_being_opened_is_heard() -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            link = Quick()
+            bus.attach(link)
+            heard = bytearray()
+            link.client(heard.extend)
+            await asyncio.sleep(1)
+            assert heard == bytes.fromhex("02 01 0a 06")
+
+    run_virtual(Kernel(), scene())
+
+
+def test_a_link_that_cannot_be_opened_leaves_nobody_on_the_line() -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            with pytest.raises(LinkError):
+                bus.attach(Refused())
+            with pytest.raises(LinkError):
+                bus.attach_live(Refused())
+            assert bus.talkers == 0
+            assert bus.bus.medium._lanes[0].listeners == [] == bus.bus.medium._taps
+
+    run_virtual(Kernel(), scene())
+
+
+def test_what_is_told_of_a_link_has_the_time_of_the_telling() -> None:
+    async def scene() -> None:
+        async with open_bus() as bus:
+            began = bus.now()
+            while isinstance(bus.host, RealHost) and bus.host.bus_now() < began + 20 * MS:  # noqa: ASYNC110
+                await asyncio.sleep(0)
+            bus.tell("gone")
+            assert bus.bus.reports[-1].when >= began + 20 * MS
+
+    asyncio.run(scene())
+
+
+def test_those_who_leave_are_heard_to_the_end_but_not_without_bound() -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=())) as bus:
+            server = TcpServer()
+            await bus.let_in(server)
+            host, _, port = server.where.removeprefix("socket://").rpartition(":")
+            for _ in range(30):
+                _, writer = await asyncio.open_connection(host, int(port))
+                writer.write(b"U" * 4_000)
+                writer.close()
+                await writer.wait_closed()
+            await asyncio.sleep(60 * 60)
+            assert bus.talkers == 0
+            # The last of them may have found the line free again.
+            assert 4_000 <= bus.bus.medium.counters().bytes < 30 * 4_000
+
+    virtually(scene())

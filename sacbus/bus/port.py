@@ -13,7 +13,7 @@ from sacbus.bus.medium import Medium
 from sacbus.kernel import MS, Ns
 from sacbus.node import Heard
 
-__all__ = ["LATENCY", "PLAIN_BITS", "Port"]
+__all__ = ["FULL", "LATENCY", "PLAIN_BITS", "Port"]
 
 #: A paced link starts to send no earlier than this after the line went idle, as a USB adapter's
 #: round trip makes it; so a quick client does not fall into a node's deaf time.

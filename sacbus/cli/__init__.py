@@ -7,6 +7,7 @@ are one line, ``error: WHAT, WHERE, WHAT TO DO``, on standard error; ``-v`` adds
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -70,6 +71,8 @@ def run(arguments: list[str]) -> int:
     When whoever read our output has left (head, less), click ends the process with status 1.
     """
     verbose = bool({"-v", "--verbose"} & set(arguments))
+    if sys.stdout is None:  # closed before we were started (`>&-`): nobody is to read it
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115 (for good)
     try:
         status = root.main(arguments, prog_name="sacbus", standalone_mode=False)
     except click.ClickException as fault:

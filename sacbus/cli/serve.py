@@ -89,7 +89,7 @@ __all__ = ["serve_command"]
 @click.option("--precise", is_flag=True, help="Be punctual to some 10 us; costs a processor.")
 @click.option(
     "--speed",
-    type=click.FloatRange(0, min_open=True),
+    type=click.FloatRange(1e-6, 1e6),
     default=1.0,
     show_default=True,
     help="Bus seconds in a second.",

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from sacbus.config.notation import HIGHEST_ADDRESS, LOOPBACK, LOWEST_ADDRESS, quoted
+from sacbus.daemon import FASTEST, SLOWEST
 from sacbus.links.places import LATENCY_US
 from sacbus.node import NodeSettings, misfits, setting_list
 
@@ -20,10 +21,6 @@ __all__ = ["ANY_LINK", "BUS", "LINKS", "NODE", "TOP", "Key", "setting_keys", "sh
 #: The slowest rate that serial ports know is 300; 4 000 000 is the fastest that Linux sets.
 LOWEST_BAUD: Final = 300
 HIGHEST_BAUD: Final = 4_000_000
-
-#: Bus seconds in a second. Beyond these, times would lose their nanoseconds as floats.
-SLOWEST: Final = 1e-6
-FASTEST: Final = 1e6
 
 #: TOML's whole numbers have 64 bits.
 _LARGEST: Final = (1 << 63) - 1

@@ -86,8 +86,17 @@ async def running(directory: Path | None = None) -> list[Feed]:
         paths = sockets(place)
     except OSError:  # a directory that is not to be trusted, or not to be read
         return []
-    feeds = await asyncio.gather(*(_hail(path) for path in paths))
-    return [feed for feed in feeds if feed is not None]
+    hails = [asyncio.create_task(_hail(path)) for path in paths]
+    try:
+        found = await asyncio.gather(*hails)
+    except BaseException:
+        for hail in hails:
+            hail.cancel()
+        for outcome in await asyncio.gather(*hails, return_exceptions=True):
+            if isinstance(outcome, Feed):
+                await outcome.close()
+        raise
+    return [feed for feed in found if feed is not None]
 
 
 async def _hail(path: Path) -> Feed | None:

@@ -177,7 +177,14 @@ def decode(text: bytes) -> Line | None:
     try:
         fields = json.loads(text)
         return _line(fields["event"], fields)
-    except (KeyError, TypeError, IndexError, AttributeError, RecursionError) as fault:
+    except (
+        KeyError,
+        TypeError,
+        LookupError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+    ) as fault:
         raise ValueError(f"not a line of a feed: {text[:80]!r}") from fault
 
 

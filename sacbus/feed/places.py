@@ -69,15 +69,15 @@ def same_link(asked: str, way: Way) -> bool:
     if asked == way.where:
         return True
     if "://" in asked or "://" in way.where:
-        return _same_url(urlsplit(asked), urlsplit(way.where))
+        try:
+            return _same_url(urlsplit(asked), urlsplit(way.where))
+        except ValueError:  # brackets that do not match, a port that there cannot be
+            return False
     return way.device is not None and os.path.realpath(asked) == way.device
 
 
 def _same_url(asked: SplitResult, served: SplitResult) -> bool:
-    try:
-        if (asked.scheme, asked.port) != (served.scheme, served.port) or asked.port is None:
-            return False
-    except ValueError:  # no port that there could be
+    if (asked.scheme, asked.port) != (served.scheme, served.port) or asked.port is None:
         return False
     there, here = asked.hostname or "", served.hostname or ""
     return there == here or (_is_local(there) and _is_local(here))

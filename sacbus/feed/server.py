@@ -44,9 +44,17 @@ QUIET_BEATS: Final = 10
 _numbers: Final = count(1)
 
 
-class _Paced(Contract):
+class _OfKind(Contract):
+    @property
+    def kind(self) -> str: ...
+
+
+class _Configured(Contract):
     @property
     def speed(self) -> float: ...
+
+    @property
+    def every_node(self) -> Sequence[_OfKind]: ...
 
 
 class Fed(Contract):
@@ -62,7 +70,7 @@ class Fed(Contract):
     def links(self) -> Sequence[Link | Server]: ...
 
     @property
-    def configuration(self) -> _Paced: ...
+    def configuration(self) -> _Configured: ...
 
 
 class FeedServer:
@@ -180,8 +188,8 @@ class FeedServer:
     def _hello(self) -> Hello:
         hosted = self._hosted
         bus = hosted.bus
-        now = bus.kernel.now
-        nodes = (node.snapshot(now) for node in bus.nodes)
+        # Not by their snapshots: looking on must not make the line late.
+        nodes = zip(bus.nodes, hosted.configuration.every_node, strict=True)
         return Hello(
             __version__,
             bus.name,
@@ -190,9 +198,9 @@ class FeedServer:
             bus.rate.bits,
             bus.medium.lanes,
             hosted.configuration.speed,
-            tuple((node.address, node.kind) for node in nodes),
+            tuple((node.address, place.kind) for node, place in nodes),
             tuple(_way(link) for link in hosted.links),
-            now,
+            bus.kernel.now,
             time.time_ns(),
         )
 

@@ -188,9 +188,11 @@ class SerialConnection(asyncio.Protocol):
         """Let what was written go out, for as long as that takes the line, and close."""
         patience = self._loop.time() + self.unsent * self._byte_s + FINISH_TIMEOUT
         # No system tells when it is done, but by a call that waits for it.
-        while self.unsent and self._loop.time() < patience:  # noqa: ASYNC110
-            await asyncio.sleep(self._byte_s)
-        self.close()
+        try:
+            while self.unsent and self._loop.time() < patience:  # noqa: ASYNC110
+                await asyncio.sleep(self._byte_s)
+        finally:  # who has no patience at all leaves no descriptor either
+            self.close()
         await asyncio.sleep(0)  # the transport ends in a callback of its own
 
     def data_received(self, data: bytes) -> None:

@@ -42,6 +42,10 @@ CHUNK: Final = 4_096
 #: have left. A node answers within 1 ms of the end of a packet.
 LINGER: Final = 2.0
 
+#: Programs that one server lets in at once: as many as a bus has places for. The next one finds its
+#: connection closed.
+PROGRAMS: Final = 250
+
 #: Connections that may wait to be let in: more programs than a bus has places for, at one instant.
 BACKLOG: Final = 128
 
@@ -140,6 +144,8 @@ class TcpLink(asyncio.BufferedProtocol):
         sock = transport.get_extra_info("socket")
         # asyncio does so too, but only for a socket that was made with the protocol's number.
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # A program whose machine has died is a talker no longer.
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         # Otherwise Linux may hold megabytes for a program that does not read, minutes of a line.
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BOUND)
         # Told as soon as the system takes no more, and again when it has taken all.
@@ -350,7 +356,9 @@ class TcpServer:
         return TcpLink(self._where, self._buffer, self._let_in)
 
     def _let_in(self, link: TcpLink) -> Callable[[], None]:
-        if self._admit is None:  # closed while the program was coming in
+        # Closed while the program was coming in; or there are so many that all buses of the process
+        # would want for descriptors.
+        if self._admit is None or len(self._links) >= PROGRAMS:
             link.close()
             return lambda: None
         self._links.add(link)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from nodes.sac import SacSettings
 from sacbus.bus import LivePort, Port
-from sacbus.kernel import MS, Kernel, Ns
+from sacbus.kernel import MS, SECOND, Kernel, Ns
 from sacbus.node import Heard
 from sacbus.wire.times import turnaround
 from tests.nodes.sac.bench import Bench, packet
@@ -153,3 +153,14 @@ def test_a_closed_live_port_passes_nothing_on() -> None:
     bench.sends(packet("v100"), at=MS)
     bench.run()
     assert outside.passed == []
+
+
+def test_an_adapter_that_brings_more_than_the_line_takes_is_held_back() -> None:
+    bench = Bench()
+    held: list[bool] = []
+    port = LivePort(bench.bus.medium, lambda _: None, hold=held.append)
+    for _ in range(20):
+        port.talk(bytes(1_000))
+    assert held == [True]
+    bench.kernel.run_until(20 * SECOND)
+    assert held == [True, False]

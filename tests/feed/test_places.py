@@ -86,3 +86,8 @@ def test_a_server_is_known_by_every_name_of_its_address(
     asked: str, served: str, same: bool
 ) -> None:
     assert same_link(asked, Way("tcp", served, None)) is same
+
+
+@pytest.mark.parametrize("asked", ["socket://[::1", "rfc2217://[zz]:1", "socket://127.0.0.1:port"])
+def test_what_is_no_url_is_no_link(asked: str) -> None:
+    assert not same_link(asked, Way("tcp", "socket://127.0.0.1:7000", None))
