@@ -1,6 +1,6 @@
 """What a real adapter does beyond what every link must do: it is pulled out, and comes back.
 
-The adapter is one of two ptys that socat joins. What a pty cannot play is declared at the end.
+The adapter is one of two ptys that socat joins..
 """
 
 from __future__ import annotations
@@ -364,20 +364,3 @@ async def test_a_port_that_is_lost_again_at_once_is_not_tried_more_often_for_it(
     await bench.unplug()
     assert bench.link._delay == 500.0
     bench.link.close()
-
-
-# ---------------------------------------------------------------------------- not testable here
-
-NO_PTY_HAS = (
-    "RTS on a wire, and how late it falls",  # when it is told to is in test_direction.py
-    "RS485 mode in a driver",  # what is asked of one, and of the next three, in test_hardware.py
-    "framing errors that a driver counts",
-    "the latency timer of a USB adapter",
-    "bytes that a UART has not sent when it is closed",
-)
-
-
-@pytest.mark.parametrize("what", NO_PTY_HAS)
-@pytest.mark.skip(reason="needs a real adapter: a pty has no such thing")
-async def test_on_a_real_adapter(what: str) -> None:
-    """The list of what was never seen to work by these tests."""
