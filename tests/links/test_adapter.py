@@ -1,6 +1,6 @@
 """What a real adapter does beyond what every link must do: it is pulled out, and comes back.
 
-The adapter is one of two ptys that socat joins..
+The adapter is one of two ptys that socat joins. What a pty cannot play is in docs/supported.md.
 """
 
 from __future__ import annotations
