@@ -119,7 +119,8 @@ class Engine:
         self._tick = -wait
         self._sign = 1 if profile.motion.cw else -1
         self.started = None
-        self._take(profile)
+        self._profile = profile
+        self._schedule()
 
     def replace(self, profile: Profile) -> None:
         """Have another profile begin when the present one would, which has not issued a pulse."""
@@ -224,9 +225,10 @@ class Engine:
         span, tick = self.clock.span, self._tick
         if self.started is None:
             self.started = self._anchor + span(-tick)
+            self._entry = _FROM_REST
             left = self._left
-            turns = left.rpm and self.started <= left.until
-            self._entry = Entry(self._sign * left.rpm, left.stalled) if turns else _FROM_REST
+            if left is not _AT_REST and self.started <= left.until:
+                self._entry = Entry(self._sign * left.rpm, left.stalled)
         duration = self._profile.duration
         if duration is not None:
             self.end = self._anchor + span(duration - tick)

@@ -70,11 +70,9 @@ def harmless(motion: Motion, drive: Drive, start_rpm: Rpm, shares: Shares) -> bo
 
 
 def of_velocity(motion: Motion, drive: Drive) -> Iterator[Caution]:
-    """Whether the velocity of a command could be said better."""
-    if motion.rpm <= COARSE_ABOVE_RPM or motion.by_cycle:
-        return
+    """Whether the velocity of a command, above COARSE_ABOVE_RPM, could be said better."""
     cycle_us = 60_000_000 // (drive.steps_per_rev * motion.rpm)
-    if motion.cycle_us == cycle_us:
+    if motion.cycle_us == cycle_us and not motion.by_cycle:
         yield Caution(
             Limit.COARSE,
             f"V{motion.rpm} is coarser than a cycle; VC{cycle_us} says the same and can be tuned",

@@ -17,7 +17,7 @@ from sacbus.motion.cuts import retargeted, rpm_of, slowed_down
 from sacbus.motion.drive import TICKS_PER_US, Drive, Rpm, has_ramp
 from sacbus.motion.layout import lay_out
 from sacbus.motion.legs import Leg, State
-from sacbus.motion.limits import Caution, cautions, harmless, of_velocity
+from sacbus.motion.limits import COARSE_ABOVE_RPM, Caution, cautions, harmless, of_velocity
 from sacbus.motion.ramp import Ticks64
 from sacbus.motion.shares import Shares
 
@@ -114,12 +114,11 @@ class Profile:
     def warnings(self) -> tuple[Caution, ...]:
         """What the command asks of the hardware that it cannot give; found when asked for."""
         motion, drive = self.motion, self.drive
-        found: list[Caution] = []
-        if not harmless(motion, drive, self.start_rpm, self.shares):
-            found += cautions(motion, drive, self.start_rpm, self.shares, self.course)
-        if self.pulses != 0:
-            found += of_velocity(motion, drive)
-        return tuple(found)
+        asked = motion, drive, self.start_rpm, self.shares
+        found = () if harmless(*asked) else tuple(cautions(*asked, self.course))
+        if motion.rpm > COARSE_ABOVE_RPM and self.pulses != 0:
+            found += tuple(of_velocity(motion, drive))
+        return found
 
     def time_of(self, pulse: int) -> int:
         """When a pulse is issued; that of the first pulse not issued is the end.
