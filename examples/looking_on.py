@@ -18,6 +18,7 @@ import json
 import os
 import socket
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,10 +27,11 @@ from typing import Any
 def feeds() -> list[Path]:
     """The sockets of the user's buses; those of killed runs refuse connections."""
     user = os.getuid()
-    runtime = os.environ.get("XDG_RUNTIME_DIR") or f"/run/user/{user}"
-    if not Path(runtime).is_dir():
-        runtime = f"/tmp/runtime-{user}"  # noqa: S108 (where sacbus puts it then)
-    return sorted(Path(runtime, "sacbus").glob("*.feed"))
+    places = (
+        os.environ.get("XDG_RUNTIME_DIR") or f"/run/user/{user}",
+        f"{tempfile.gettempdir()}/runtime-{user}",  # where sacbus puts it without the first
+    )
+    return sorted(feed for place in places for feed in Path(place, "sacbus").glob("*.feed"))
 
 
 def lines(feed: socket.socket) -> Iterator[dict[str, Any]]:

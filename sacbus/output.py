@@ -7,6 +7,7 @@ table is ``live.py``'s. A leaf beside the command line.
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sys
 from collections.abc import Callable, Sequence
@@ -262,7 +263,8 @@ def output_for(
     """The form that was asked for; a table only on a terminal."""
     if as_json:
         return Json(buses, lost)
-    if show_table and sys.stdout.isatty():
+    # A dumb terminal cannot move its cursor.
+    if show_table and sys.stdout.isatty() and os.environ.get("TERM") != "dumb":
         return Table(buses, lost)
     return Lines(buses, lost)
 

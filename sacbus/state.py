@@ -32,8 +32,11 @@ class StateError(OSError):
 
 
 def default_directory() -> Path:
-    """The user's own state directory for sacbus."""
-    return user_state_path("sacbus")
+    """The user's own state directory for sacbus; StateError for a user who has no home."""
+    try:
+        return user_state_path("sacbus")
+    except RuntimeError as fault:  # no HOME, and nobody by this number in the system's list
+        raise StateError(f"there is no home directory for node memory, HOME, {_CURE}") from fault
 
 
 class StateDirectory:

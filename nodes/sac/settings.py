@@ -110,7 +110,7 @@ class SacSettings(NodeSettings):
         metadata={
             "pattern": r"(\d{1,6}:\d{1,7}(,\d{1,6}:\d{1,7})*)?",
             "form": "points RPM:RAD/S2 such as 0:900,600:400,1200:0",
-            "help": "acceleration that its motor follows at a speed, with its load; none: any",
+            "help": "acceleration that its motor follows at a speed; needs pull_in; none: any",
         },
     )
 

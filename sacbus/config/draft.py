@@ -93,11 +93,20 @@ class _Reader:
 
     def everything(self) -> Draft:
         top = Table.read(self._findings, (), self._source.content, TOP)
-        state = self._state(top, default_directory())
+        state = self._state(top, None)
+        if top.lacks("state") and self._wants_default(top):
+            state = default_directory()
         found = tables(self._findings, top.at("bus"), top.get("bus"), "bus")
         if not found and top.get("bus") == []:
             self._findings.add(top.at("bus"), "expected one [[bus]] at least, got none", "add one")
         return Draft(top, [self._bus(path, content, state) for path, content in found])
+
+    def _wants_default(self, top: Table) -> bool:
+        """Whether any bus has no word of its own on where memory is kept."""
+        buses = top.get("bus")
+        return not isinstance(buses, list) or any(
+            not isinstance(bus, dict) or "state" not in bus for bus in buses
+        )
 
     def _bus(self, path: lines.Path, content: Mapping[str, object], state: Path | None) -> BusDraft:
         table = Table.read(self._findings, path, content, BUS)

@@ -79,16 +79,14 @@ def same_link(asked: str, way: Way) -> bool:
 def _same_url(asked: SplitResult, served: SplitResult) -> bool:
     if (asked.scheme, asked.port) != (served.scheme, served.port) or asked.port is None:
         return False
-    there, here = asked.hostname or "", served.hostname or ""
-    return there == here or (_is_local(there) and _is_local(here))
-
-
-def _is_local(host: str) -> bool:
-    """Loopback by name or number, or the wildcard that includes it."""
-    if host in ("", "localhost"):
+    there, here = asked.hostname or "localhost", served.hostname or "localhost"
+    if there == here:
         return True
     try:
-        address = ip_address(host)
-    except ValueError:
+        listens = ip_address(here)
+        if there == "localhost":  # whichever of the two it is taken for
+            return listens.is_loopback or listens.is_unspecified
+        wanted = ip_address(there)
+    except ValueError:  # a name: what it stands for is not asked
         return False
-    return address.is_loopback or address.is_unspecified
+    return wanted.is_loopback and listens.is_unspecified and wanted.version == listens.version

@@ -91,3 +91,16 @@ def test_a_server_is_known_by_every_name_of_its_address(
 @pytest.mark.parametrize("asked", ["socket://[::1", "rfc2217://[zz]:1", "socket://127.0.0.1:port"])
 def test_what_is_no_url_is_no_link(asked: str) -> None:
     assert not same_link(asked, Way("tcp", "socket://127.0.0.1:7000", None))
+
+
+@pytest.mark.parametrize(
+    ("asked", "served", "same"),
+    [
+        ("socket://[::1]:7000", "socket://127.0.0.1:7000", False),
+        ("socket://127.0.0.1:7000", "socket://[::1]:7000", False),
+        ("socket://[::1]:7000", "socket://[::]:7000", True),
+        ("socket://[::1]:7000", "socket://0.0.0.0:7000", False),
+    ],
+)
+def test_two_loopbacks_are_two_places(asked: str, served: str, same: bool) -> None:
+    assert same_link(asked, Way("tcp", served, None)) is same
