@@ -497,8 +497,8 @@ def test_without_gap_testing_the_velocity_outlasts_soft_ops() -> None:
     line.says("g", "m40v100a999d999", "m100v100a1d1")
     line.run()
     assert line.ran == [40, 100]
-    # All of the second one's ramp is down, which takes 0.704 s, after 10 steps at 3 ms. Had it begun
-    # at 10 RPM, it would have taken 1.03 s.
+    # All of the second one's ramp is down, which takes 0.704 s, after 10 steps at 3 ms. Had it
+    # begun at 10 RPM, it would have taken 1.03 s.
     heard = [said.at for said in line.bench.heard if said.data[3:4] == b"\x11"]
     ends = [said.at for said in line.bench.heard if said.data[3:4] == b"\x12"]
     assert len(heard) == len(ends) == 2

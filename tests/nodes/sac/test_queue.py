@@ -53,8 +53,8 @@ def test_an_edit_makes_nothing_pending_and_moves_no_pointer() -> None:
 
 def test_hidden_positions_are_kept_apart() -> None:
     queue = Queue(Defaults())
-    queue.keep_hidden(CONTINUOUS_POSITION, motion(1))
-    queue.keep_hidden(THROW_AWAY_POSITION, motion(2))
+    assert (queue.row(CONTINUOUS_POSITION), queue.row(THROW_AWAY_POSITION)) == (SEED, SEED)
+    queue.continuous, queue.throw_away = motion(1), motion(2)
     assert (queue.row(0).steps, queue.row(31).steps) == (1, 2)
     assert queue.rows() == (SEED,) * QUEUE_LENGTH
     queue.load([motion(7)] * QUEUE_LENGTH)
@@ -134,18 +134,17 @@ def test_whatever_is_done_what_waits_stands_in_a_row_behind_the_next_free_one(
     queue = Queue(Defaults())
     taken: int | None = None
     for number, deed in enumerate(deeds):
-        match deed:
-            case "add":
-                queue.add(motion(number + 1))
-            case "take" if queue.pending:
-                taken = queue.pending.pop(0)
-            case "undo":
-                queue.undo()
-            case "put back" if taken is not None and queue.pending[:1] == [taken % 30 + 1]:
-                queue.put_back(taken)
-                taken = None
-            case ("write", position):
-                queue.write(position, motion(number + 1))
+        if isinstance(deed, tuple):
+            queue.write(deed[1], motion(number + 1))
+        elif deed == "add":
+            queue.add(motion(number + 1))
+        elif deed == "undo":
+            queue.undo()
+        elif deed == "take" and queue.pending:
+            taken = queue.pending.pop(0)
+        elif deed == "put back" and taken is not None and queue.pending[:1] == [taken % 30 + 1]:
+            queue.put_back(taken)
+            taken = None
         count = len(queue.pending)
         assert count <= QUEUE_LENGTH
         before = [(queue.next_free - 2 - at) % QUEUE_LENGTH + 1 for at in range(count)]
