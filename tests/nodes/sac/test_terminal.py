@@ -143,9 +143,11 @@ def test_a_sign_within_a_line_or_in_a_mode_is_a_character(console: Console) -> N
     console.types("m-")
     assert console.bench.node.snapshot(0).position_pulses == 0
     console.types("\x7f\x7f\rqp\r")
-    console.types("+\r")
+    console.types("+")
+    assert console.bench.told() == []
+    console.types("8\r")
     assert console.bench.node.snapshot(0).position_pulses == 0
-    assert [report.line for report in console.bench.told()] == ["+"]
+    assert [report.line for report in console.bench.told()] == ["+8"]
 
 
 # ---- the manual's own sessions ------------------------------------------------------------------
