@@ -12,8 +12,10 @@ from collections.abc import Callable
 from typing import Final
 
 from nodes.sac.command import CommandProcessor, Obeyed
+from nodes.sac.system import Board, SystemLine, obey
 from sacbus.kernel import Ns
 from sacbus.language import (
+    Configure,
     Empty,
     Forward,
     Message,
@@ -34,16 +36,21 @@ _SPACE: Final = 0x20
 
 
 class MessageProcessor:
-    """Lines in. ``send(dest, body, not_before)`` sends a line on; ``tell`` takes reports."""
+    """Lines in. ``send(dest, body, not_before)`` sends a line on; ``tell`` takes reports.
 
-    __slots__ = ("_commands", "_last_source", "_line", "_send", "_tell")
+    ``board`` is what system commands work on.
+    """
+
+    __slots__ = ("_board", "_commands", "_last_source", "_line", "_send", "_tell")
 
     def __init__(
         self,
         commands: CommandProcessor,
         send: Callable[[int, bytes, Ns], Ns],
         tell: Callable[[ReportKind, str, str, int], None],
+        board: Board,
     ) -> None:
+        self._board = board
         self._commands = commands
         self._send = send
         self._tell = tell
@@ -88,6 +95,8 @@ class MessageProcessor:
                 )
             case _ if isinstance(command, Obeyed):
                 self._commands.execute(command, now)
+            case _ if isinstance(command, SystemLine) and not isinstance(command, Configure):
+                obey(command, self._board, now)
             case _:
                 text = f"not obeyed by this version: {describe(command)}"
                 self._tell(ReportKind.REFUSED, text, self.line, 1)

@@ -1,7 +1,8 @@
 """The network port of a SAC: what it hears in packets, when it answers, when it is deaf.
 
 Owns the receiver, the turnaround, the deaf time and the packets that wait to be sent. What a body
-means is the message processor's business. Figures: ``sacbus.wire.times``.
+means is the message processor's business. A port that is set to another rate than the line's hears
+nothing, and nobody understands what it sends. Figures: ``sacbus.wire.times``.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from nodes.sac.memory import Memory, name_of, port_on_line
 from nodes.sac.robust import RobustReceiver
 from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
@@ -34,6 +36,16 @@ __all__ = ["NetworkPort"]
 ENABLE_LEAD: Final[Ns] = 8_000
 
 
+#: Per cent that two rates may differ: a receiver that samples in the middle of the last bit of ten
+#: is wrong beyond 5 %, and half of that is what data sheets leave to each side.
+TOLERANCE: Final = 2.5
+
+#: Deaf until this is deaf for good.
+_FOR_EVER: Final[Ns] = 2**63
+
+#: What arrives of bytes at a wrong rate: always others, and never one that begins or ends a packet.
+_GARBLED: Final = bytes((byte ^ 0x55) | 0x80 for byte in range(256))
+
 #: The device's times by body length: every packet asks for two of them.
 _SIZES: Final = range(MAX_BODY + 1)
 _AFTER_NUL: Final = [turnaround(size, nul_follows=True) for size in _SIZES]
@@ -56,6 +68,7 @@ class NetworkPort:
         "_answer_span",
         "_deaf",
         "_deaf_until",
+        "_garbles",
         "_outbox",
         "_rate",
         "_receiver",
@@ -76,13 +89,13 @@ class NetworkPort:
 
     def __init__(
         self,
-        address: int,
         settings: SacSettings,
         rate: LineRate,
         accept: Callable[[bytes, int, int, Ns], object],
         tell: Callable[[ReportKind, str], None],
     ) -> None:
-        self.address = address
+        """``rate`` is the line's. It is at address 0 until it is :meth:`set_up`."""
+        self.address = GENERAL_CALL
         self._turnaround = settings.turnaround
         self._deaf = settings.deaf_time
         self._rate = rate
@@ -91,7 +104,7 @@ class NetworkPort:
         self._tell = tell
         self._robust = settings.receiver == "robust"
         self._receiver: DeviceReceiver | RobustReceiver = (
-            RobustReceiver(address) if self._robust else DeviceReceiver(address)
+            RobustReceiver(GENERAL_CALL) if self._robust else DeviceReceiver(GENERAL_CALL)
         )
         #: The ACK or NAK that waits, and when its first bit goes out, or would if there were one.
         self._answer: bytes | None = None
@@ -102,6 +115,8 @@ class NetworkPort:
         self._outbox: list[tuple[Ns, bytes]] = []
         self._sent_until: Ns = 0
         self._deaf_until: Ns = 0
+        #: Whether it is set to another rate than the line's.
+        self._garbles = False
         self.ack = True
         self.crc = True
         self.acks = 0
@@ -111,6 +126,36 @@ class NetworkPort:
         self.receiving = self._receiver.open
         #: When something is to be sent next; None when nothing is.
         self.due: Ns | None = None
+
+    def set_up(self, memory: Memory) -> None:
+        """Take address, rate and switches from memory, as at a boot.
+
+        An answer that waits still goes out: it was the answer of the old address.
+        """
+        self.ack = bool(memory.ack)
+        self.crc = bool(memory.crc)
+        self.address = self._receiver.address = memory.d_id
+        baud = self._rate.baud
+        self._garbles = abs(memory.rate - baud) * 100 > TOLERANCE * baud
+        if self._garbles:
+            self._deaf_until = _FOR_EVER
+            self._tell(
+                ReportKind.WARNING,
+                f"{name_of(port_on_line(memory.network))} is {memory.rate} baud, the line runs at "
+                f"{baud}: it hears nothing, and nobody understands it",
+            )
+        elif self._deaf_until == _FOR_EVER:
+            self._deaf_until = 0
+
+    def listen_from(self, moment: Ns | None) -> None:
+        """Hear nothing before ``moment``, None: for good; what was to be sent is forgotten."""
+        self._answer = None
+        self._waits_for = None
+        self._outbox.clear()
+        self.receiving = self._receiver.open
+        self.due = None
+        if not self._garbles:
+            self._deaf_until = _FOR_EVER if moment is None else moment
 
     def hear(self, heard: Heard) -> None:
         """Bytes have arrived."""
@@ -167,7 +212,7 @@ class NetworkPort:
             data = self._outbox.pop(0)[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
         self._see_what_is_due()
-        return data
+        return data.translate(_GARBLED) if self._garbles else data
 
     def _busy_until(self) -> Ns:
         """When the answer that waits, or is on its way, is out, and a packet may follow."""

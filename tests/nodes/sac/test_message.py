@@ -39,7 +39,6 @@ def reports(bench: Bench) -> list[tuple[str, str, int]]:
         ("a1.2.3", 5),
         ("d-1", 2),
         ("m4294967296", 2),
-        ("$R", 1),
         ("$K0", 1),
         ("q", 1),
         ("Q5m200", 1),
