@@ -1,10 +1,10 @@
 """The contract between the bus and a kind of node, and the registry of kinds.
 
 Owns the shapes in which the two meet: what a node hears (:class:`Heard`), what it can be asked
-(:class:`Node`), what it tells out of band (:class:`Report`), what a wire protocol must answer
-(:class:`Protocol`), and how kinds are found: through entry points of the group ``sacbus.nodes``,
-the project's own no differently from a third party's. Time is always an argument, in ns of bus
-time. Nothing here knows a particular protocol or kind.
+(:class:`Node`), its :class:`Terminal`, what it tells out of band (:class:`Report`), what a wire
+protocol must answer (:class:`Protocol`), and how kinds are found: through entry points of the group
+``sacbus.nodes``, the project's own no differently from a third party's. Time is always an argument,
+in ns of bus time. Nothing here knows a particular protocol or kind.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ __all__ = [
     "Setting",
     "SettingError",
     "Snapshot",
+    "Terminal",
     "find_kind",
     "kind_names",
     "kinds",
@@ -133,6 +134,17 @@ class Snapshot:
     rotor_steps: float | None = None
 
 
+class Terminal(Contract):
+    """A node's terminal port: keys in, text out; a dumb terminal, no packets."""
+
+    #: Takes what the port prints, at once; None while nobody is connected: what is printed is lost.
+    show: Callable[[bytes], None] | None
+
+    def type(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive. The owner asks the bus to touch the node afterwards (``Bus.touch``)."""
+        ...
+
+
 class Node(Contract):
     """A device on the bus: a synchronous state machine that is told the time.
 
@@ -148,6 +160,11 @@ class Node(Contract):
     @property
     def receiving(self) -> bool:
         """True while its receiver stands open: bytes that are not for it may still matter to it."""
+        ...
+
+    @property
+    def terminal(self) -> Terminal | None:
+        """Its terminal port, made when it is first asked for; None for kinds without one."""
         ...
 
     def hear(self, heard: Heard, now: Ns) -> None:

@@ -16,15 +16,13 @@ from typing import Final
 
 from sacbus.kernel import SECOND, Ns
 
-__all__ = ["LISTENS", "OFF", "PROMPT", "VERSION_LINE", "Start"]
+__all__ = ["LISTENS", "OFF", "VERSION_LINE", "Start"]
 
 #: How long a key restores the factory's memory (manual: "approximately a one second delay").
 LISTENS: Final[Ns] = SECOND
 
 #: The manual mentions it and shows none (decision). It is the emulated firmware's, not ours.
 VERSION_LINE: Final = "SAC v1.0"
-
-PROMPT: Final = "SAC>"
 
 
 class Start:

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from nodes.sac.boot import LISTENS, OFF, PROMPT, VERSION_LINE, Start
+from nodes.sac.boot import LISTENS, OFF, VERSION_LINE, Start
 from nodes.sac.command import CommandProcessor, shortest
 from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
 from nodes.sac.pins import Outputs, outputs
+from nodes.sac.queries import Query, answer
+from nodes.sac.screens import Flags
 from nodes.sac.settings import SacSettings
+from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import LineRate, Ns
 from sacbus.language import Session, Stop
 from sacbus.motion import Drive, Timebase
@@ -46,11 +49,11 @@ class SacNode:
         "_settings",
         "_start",
         "_tell_bus",
+        "_terminal",
         "_xclk_hz",
         "eeprom",
         "memory_changed",
         "rst",
-        "show",
         "throttles",
     )
 
@@ -62,12 +65,11 @@ class SacNode:
         self._rate = rate
         self._tell_bus = tell
         self._now: Ns = 0
+        self._terminal: TerminalPort | None = None
         #: Frequency of the clock at the xclk pin.
         self._xclk_hz = settings.xclk_hz
         #: Level of the RST pin; while it is 0, a cold boot restores the factory's memory.
         self.rst = 1
-        #: Takes what the terminal is shown; None while nobody is there.
-        self.show: Callable[[str], None] | None = None
         #: Called each time the contents of the EEPROM have changed.
         self.memory_changed: Callable[[], None] | None = None
         #: What the EEPROM holds; what the node obeys is what it held at the last boot.
@@ -84,12 +86,14 @@ class SacNode:
         memory = self._memory = self.eeprom
         self._engine = Engine(self._settings.oscillator, self._external_clock())
         self._commands = CommandProcessor(
-            Session.start(memory.defaults()), self._drive(), self._engine, self._tell_of_command
+            Session.start(memory.defaults()), self._drive(), self._engine, self
         )
         if memory.queue is not None:
             self._commands.queue.load(memory.queue)
         self._network = NetworkPort(self._settings, self._rate, self._network_line, self._tell)
-        self._messages = MessageProcessor(self._commands, self._network.send, self._tell_line, self)
+        self._messages = MessageProcessor(
+            self._commands, self._network.send, self._tell_line, self, self._terminal
+        )
         #: Levels of MS3 MS2 MS1, bits 2 to 0: low until a driver's table says otherwise.
         self._microstep_pins = 0
         self._network.set_up(memory)
@@ -97,7 +101,8 @@ class SacNode:
         if cold:
             self._network.listen_from(now + LISTENS)
             self._start = Start(now + LISTENS, listens=True)
-            self._print(VERSION_LINE + "\r\n")
+            if self._terminal is not None:
+                self._terminal.boot(VERSION_LINE)
         else:
             self._start = Start(now) if memory.autorun else None
 
@@ -209,10 +214,6 @@ class SacNode:
             self._network.listen_from(None)
             self._start = OFF
 
-    def key_at_boot(self) -> bool:
-        """A key has come on the terminal; True when the boot that is under way took it."""
-        return self._start is not None and self._start.key()
-
     def reboot(self, now: Ns) -> None:
         """The warm boot of ``$R``: parameters anew from EEPROM; queue and motor stay.
 
@@ -233,7 +234,7 @@ class SacNode:
         memory = self._memory
         #: Whether the encoder turns the speed of continuous motion (EnT), or steps the motor (EnF).
         self.throttles = False
-        self.send_soft_ops(bool(memory.soft_ops))
+        self._commands.switch_ops(on=bool(memory.soft_ops))
         pins = memory.microstep_pins
         if pins is not None:
             self._microstep_pins = pins
@@ -251,7 +252,8 @@ class SacNode:
             self.write(self._factory_memory())
             self._boot(now, cold=False)
         self._start = None
-        self._print(PROMPT)
+        if self._terminal is not None:
+            self._terminal.restart()
         if self._memory.autorun:
             self._commands.autorun(self._memory.autorun, now)
 
@@ -262,11 +264,6 @@ class SacNode:
             pull_in_rpm=settings.pull_in_rpm,
             pull_out=settings.pull_out_curve,
         )
-
-    def _print(self, text: str) -> None:
-        """Show text on the terminal, if anybody is there."""
-        if self.show is not None:
-            self.show(text)
 
     # ---- what its parts, and its pins, are asked for ----
 
@@ -283,6 +280,41 @@ class SacNode:
     def pins(self, now: Ns) -> Outputs:
         """Levels of its output pins at ``now``."""
         return outputs(self._memory, self._engine, self._microstep_pins, now)
+
+    # ---- the terminal ----
+
+    @property
+    def terminal(self) -> TerminalPort:
+        """Its terminal port, made when it is first asked for: most nodes never have a user."""
+        if self._terminal is None:
+            self._terminal = self._messages.terminal = TerminalPort(self)
+        return self._terminal
+
+    def keys_typed(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive at the terminal port."""
+        self._now = now
+        if self._start is None or not self._start.key():
+            self.terminal.take(keys, now)
+
+    def line_typed(self, line: bytes, now: Ns) -> None:
+        """A line was typed at the terminal port."""
+        self._messages.terminal_line(line, self.terminal, now)
+
+    def answer(self, query: Query) -> list[str]:
+        """What a query shows on the terminal."""
+        commands, network = self._commands, self._network
+        flags = Flags(
+            gap=commands.gap,
+            debug=commands.debug,
+            throttle=self.throttles,
+            soft_ops=commands.soft_ops,
+            ack=network.ack,
+            crc=network.crc,
+            source=self._messages.last_source,
+        )
+        return answer(query, commands, self.eeprom, flags)
+
+    # ---- pins ----
 
     def feed_xclk(self, hz: int, now: Ns) -> None:
         """From ``now`` on a clock of ``hz`` comes to the xclk pin; 0: no edges.
@@ -304,18 +336,14 @@ class SacNode:
     def _network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         self._messages.network_line(body, source, destination, now)
 
-    def send_soft_ops(self, on: bool) -> None:
-        """Tell everybody of the starts and ends of commands, or no longer."""
-        self._commands.tell_ops(self._tell_ops if on else None)
-
-    def _tell_ops(self, *, start: bool, at: Ns) -> Ns:
+    def tell_ops(self, *, start: bool, at: Ns) -> Ns:
         """Soft ops tell everybody that a command starts or ends; when that will be out."""
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
     def _tell(self, kind: ReportKind, text: str) -> None:
         self._tell_line(kind, text, "", 0)
 
-    def _tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
+    def tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
         """About a command that runs later than it came, or else about the line that has come."""
         self._tell_line(kind, text, self._messages.line if command is None else command, 0)
 
