@@ -13,7 +13,7 @@ Source: manual, "Communications", "Queue", "xRef"; spec, "Two ports, two manners
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from nodes.sac import screens
@@ -71,26 +71,18 @@ _SCREENS: Final[Mapping[Mode, Query]] = {
 
 
 class MessageProcessor:
-    """Lines in. ``send(dest, body, not_before)`` sends a line on; ``tell`` takes reports.
+    """Lines in. ``terminal`` is None until somebody has asked for the port."""
 
-    ``board`` is what system commands work on. ``terminal`` is None until somebody has asked for the
-    port.
-    """
-
-    __slots__ = ("_board", "_commands", "_line", "_send", "_tell", "last_source", "terminal")
+    __slots__ = ("_board", "_commands", "_line", "last_source", "terminal")
 
     def __init__(
         self,
         commands: CommandProcessor,
-        send: Callable[[int, bytes, Ns], Ns],
-        tell: Callable[[ReportKind, str, str, int], None],
         board: Board,
         terminal: TerminalPort | None = None,
     ) -> None:
         self._board = board
         self._commands = commands
-        self._send = send
-        self._tell = tell
         self.terminal = terminal
         #: Who sent the last packet that was not a general call; ``/`` answers there.
         self.last_source = GENERAL_CALL
@@ -166,12 +158,12 @@ class MessageProcessor:
 
     def _send_on(self, forward: Forward, now: Ns) -> None:
         to = self.last_source if forward.destination is None else forward.destination
-        self._send(to, forward.rest.encode("latin-1"), now)
+        self._board.network.send(to, forward.rest.encode("latin-1"), now)
         if self.terminal is not None:
             self.terminal.print((f"{to}> {forward.rest}",))
 
     def _show_message(self, text: str) -> None:
-        self._tell(ReportKind.MESSAGE, text, self.line, 0)
+        self._board.tell(ReportKind.MESSAGE, text, self.line, 0)
         if self.terminal is not None:
             self.terminal.print((text,))
 
@@ -200,19 +192,19 @@ class MessageProcessor:
         terminal.print(screens.timing(len(self._line) + 1, load))
 
     def _ignored(self, text: str) -> None:
-        self._tell(ReportKind.IGNORED, text, self.line, 0)
+        self._board.tell(ReportKind.IGNORED, text, self.line, 0)
 
     def _tell_remarks(self, parsed: Parsed) -> None:
         kind = ReportKind.REFUSED if parsed.command is None else ReportKind.WARNING
         for remark in parsed.remarks:
             text = f"expected {remark.expected}, got {remark.got}: {remark.text}"
-            self._tell(kind, text, self.line, remark.column)
+            self._board.tell(kind, text, self.line, remark.column)
 
     def _tell_of_rest(self, body: bytes) -> None:
         """A space ends a command; who wrote more than padding behind it may not know that."""
         command, _, rest = body.partition(b" ")
         if rest.strip(b" ") and not command[:1].isdigit() and command[:1] not in b"/.":
-            self._tell(
+            self._board.tell(
                 ReportKind.IGNORED,
                 "a space ends a command: what follows it is ignored",
                 self.line,

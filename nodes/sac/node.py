@@ -90,10 +90,8 @@ class SacNode:
         )
         if memory.queue is not None:
             self._commands.queue.load(memory.queue)
-        self._network = NetworkPort(self._settings, self._rate, self._network_line, self._tell)
-        self._messages = MessageProcessor(
-            self._commands, self._network.send, self._tell_line, self, self._terminal
-        )
+        self._network = NetworkPort(self._settings, self._rate, self)
+        self._messages = MessageProcessor(self._commands, self, self._terminal)
         #: Levels of MS3 MS2 MS1, bits 2 to 0: low until a driver's table says otherwise.
         self._microstep_pins = 0
         self._network.set_up(memory)
@@ -179,9 +177,9 @@ class SacNode:
         kept = {name: value for name, value in memory.items() if name not in asked}
         self.eeprom, remarks = self._factory_memory().restored(kept)
         for remark in remarks:
-            self._tell(ReportKind.WARNING, remark)
+            self.tell(ReportKind.WARNING, remark)
         if self.eeprom.d_id != self._configured:
-            self._tell(
+            self.tell(
                 ReportKind.WARNING,
                 f"EEPROM: d_id {self.eeprom.d_id} is stored and wins over the configured "
                 f"{self._configured}",
@@ -239,7 +237,7 @@ class SacNode:
         if pins is not None:
             self._microstep_pins = pins
         else:
-            self._tell(
+            self.tell(
                 ReportKind.WARNING,
                 f"driver {memory.r_id} has no microsteps of 2**{memory.ustep}: pulses are "
                 "multiplied by that, and its pins stay as they are",
@@ -333,19 +331,18 @@ class SacNode:
         memory = self._memory
         return None if memory.clock else Timebase.external(memory.xfreq, self._xclk_hz)
 
-    def _network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+    def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+        """A packet was accepted."""
         self._messages.network_line(body, source, destination, now)
 
     def tell_ops(self, *, start: bool, at: Ns) -> Ns:
         """Soft ops tell everybody that a command starts or ends; when that will be out."""
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
-    def _tell(self, kind: ReportKind, text: str) -> None:
-        self._tell_line(kind, text, "", 0)
-
     def tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
         """About a command that runs later than it came, or else about the line that has come."""
-        self._tell_line(kind, text, self._messages.line if command is None else command, 0)
+        self.tell(kind, text, self._messages.line if command is None else command, 0)
 
-    def _tell_line(self, kind: ReportKind, text: str, line: str, column: int) -> None:
+    def tell(self, kind: ReportKind, text: str, line: str = "", column: int = 0) -> None:
+        """Report something, now."""
         self._tell_bus(Report(self._now, self.address, kind, text, line, column))

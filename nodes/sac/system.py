@@ -35,6 +35,7 @@ from sacbus.language import (
     ToggleStepMode,
     seeded_row,
 )
+from sacbus.node import ReportKind
 
 __all__ = ["Board", "SystemLine", "obey"]
 
@@ -43,7 +44,7 @@ SystemLine = SystemCommand | SaveQueue | RestoreQueue
 
 
 class Board(Protocol):
-    """What the commands reach of a node."""
+    """What lines reach of a node."""
 
     #: Whether the encoder turns the speed of continuous motion (EnT), or steps the motor (EnF).
     throttles: bool
@@ -69,6 +70,10 @@ class Board(Protocol):
 
     def reboot(self, now: Ns) -> None:
         """A warm boot."""
+        ...
+
+    def tell(self, kind: ReportKind, text: str, line: str = "", column: int = 0) -> None:
+        """Something worth a report, about a line or none, and where in it (0: the whole)."""
         ...
 
 
