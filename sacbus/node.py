@@ -29,6 +29,8 @@ __all__ = [
     "Node",
     "NodeKind",
     "NodeSettings",
+    "PinError",
+    "Pins",
     "Protocol",
     "Report",
     "ReportKind",
@@ -145,6 +147,47 @@ class Terminal(Contract):
         ...
 
 
+class PinError(ValueError):
+    """A pin that a node does not have, or a level that it cannot have; the text is for users."""
+
+
+class Pins(Contract):
+    """A node's pins: inputs to drive, outputs to look at. Levels are 0 and 1."""
+
+    @property
+    def inputs(self) -> Sequence[str]:
+        """Names of the pins that can be driven."""
+        ...
+
+    @property
+    def outputs(self) -> Sequence[str]:
+        """Names of the pins that the node drives."""
+        ...
+
+    @property
+    def told(self) -> Sequence[str]:
+        """The outputs whose edges a watcher is told of; pulses are too many."""
+        ...
+
+    def drive(self, pin: str, level: int, now: Ns) -> None:
+        """Drive an input. PinError for what is no input, and a level that it cannot have.
+
+        The owner asks the bus to touch the node afterwards (``Bus.touch``).
+        """
+        ...
+
+    def level(self, pin: str, now: Ns) -> int:
+        """The level of any pin at ``now``; PinError if there is none of that name."""
+        ...
+
+    def watch(self, watcher: Callable[[str, int, Ns], object] | None, now: Ns) -> None:
+        """Have ``watcher(pin, level, when)`` called at each edge from ``now`` on; None: nobody.
+
+        The owner asks the bus to touch the node afterwards (``Bus.touch``).
+        """
+        ...
+
+
 class Node(Contract):
     """A device on the bus: a synchronous state machine that is told the time.
 
@@ -165,6 +208,11 @@ class Node(Contract):
     @property
     def terminal(self) -> Terminal | None:
         """Its terminal port, made when it is first asked for; None for kinds without one."""
+        ...
+
+    @property
+    def pins(self) -> Pins | None:
+        """Its pins, made when first asked for; None for a kind without any."""
         ...
 
     def hear(self, heard: Heard, now: Ns) -> None:

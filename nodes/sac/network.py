@@ -27,7 +27,13 @@ from sacbus.wire import (
     encode,
     nak,
 )
-from sacbus.wire.times import ANSWER_BYTES, deaf_time, turnaround
+from sacbus.wire.times import (
+    ANSWER_BYTES,
+    ENABLE_LEAD_UNCHECKED,
+    deaf_time,
+    enable_lead,
+    turnaround,
+)
 
 __all__ = ["NetworkPort", "PortOwner"]
 
@@ -49,6 +55,7 @@ _GARBLED: Final = bytes((byte ^ 0x55) | 0x80 for byte in range(256))
 _SIZES: Final = range(MAX_BODY + 1)
 _AFTER_NUL: Final = [turnaround(size, nul_follows=True) for size in _SIZES]
 _AFTER_TRIGGER: Final = [turnaround(size, nul_follows=False) for size in _SIZES]
+_ENABLED_BEFORE: Final = [enable_lead(size) for size in _SIZES]
 _DEAF_AFTER_ANSWER: Final = [deaf_time(size, answered=True) for size in _SIZES]
 _DEAF_AFTER_BROADCAST: Final = [deaf_time(size, answered=False) for size in _SIZES]
 
@@ -77,6 +84,8 @@ class NetworkPort:
         "_answer_span",
         "_deaf",
         "_deaf_until",
+        "_enable_lead",
+        "_enabled_until",
         "_garbles",
         "_outbox",
         "_owner",
@@ -116,6 +125,9 @@ class NetworkPort:
         #: Packets of its own, each with the earliest time for it.
         self._outbox: list[tuple[Ns, bytes]] = []
         self._sent_until: Ns = 0
+        #: How long before its answer the driver is enabled, and until when it is after a message.
+        self._enable_lead: Ns = 0
+        self._enabled_until: Ns = 0
         self._deaf_until: Ns = 0
         #: Whether it is set to another rate than the line's.
         self._garbles = False
@@ -213,8 +225,15 @@ class NetworkPort:
         else:
             data = self._outbox.pop(0)[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
+        self._enabled_until = self._sent_until
         self._see_what_is_due()
         return data.translate(_GARBLED) if self._garbles else data
+
+    def sends(self, now: Ns) -> int:
+        """The level of the tx_en pin: 1 while the driver is enabled, from before the first bit."""
+        lead = self._enable_lead if self._answer is not None else ENABLE_LEAD
+        waits = self.due is not None and now >= self.due - lead
+        return int(waits or now < self._enabled_until)
 
     def _busy_until(self) -> Ns:
         """When the answer that waits, or is on its way, is out, and a packet may follow."""
@@ -252,6 +271,8 @@ class NetworkPort:
                     ReportKind.LOST, "an answer that had not begun when the next was due"
                 )
             self._answer = (nak if wrong else ack)(packet.src, self.address)
+            unchecked = packet.verdict is Verdict.UNCHECKED
+            self._enable_lead = ENABLE_LEAD_UNCHECKED if unchecked else _ENABLED_BEFORE[size]
         self._answer_at = replies
         if self._turnaround and not self._robust and (answered if wrong else not run):
             self._waits_for = (limit, size)

@@ -14,7 +14,7 @@ from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
-from nodes.sac.pins import Outputs, outputs
+from nodes.sac.pins import SacPins
 from nodes.sac.queries import Query, answer
 from nodes.sac.screens import Flags
 from nodes.sac.settings import SacSettings
@@ -42,19 +42,20 @@ class SacNode:
         "_engine",
         "_memory",
         "_messages",
-        "_microstep_pins",
         "_network",
         "_now",
+        "_pins",
         "_rate",
         "_settings",
         "_start",
         "_tell_bus",
         "_terminal",
-        "_xclk_hz",
         "eeprom",
         "memory_changed",
-        "rst",
+        "microstep_pins",
+        "soft_ops",
         "throttles",
+        "xclk_hz",
     )
 
     def __init__(
@@ -67,9 +68,8 @@ class SacNode:
         self._now: Ns = 0
         self._terminal: TerminalPort | None = None
         #: Frequency of the clock at the xclk pin.
-        self._xclk_hz = settings.xclk_hz
-        #: Level of the RST pin; while it is 0, a cold boot restores the factory's memory.
-        self.rst = 1
+        self.xclk_hz = settings.xclk_hz
+        self._pins: SacPins | None = None
         #: Called each time the contents of the EEPROM have changed.
         self.memory_changed: Callable[[], None] | None = None
         #: What the EEPROM holds; what the node obeys is what it held at the last boot.
@@ -90,10 +90,12 @@ class SacNode:
         )
         if memory.queue is not None:
             self._commands.queue.load(memory.queue)
+        if self._pins is not None and not self._pins.estop:
+            self._commands.bar(barred=True, now=now)
         self._network = NetworkPort(self._settings, self._rate, self)
         self._messages = MessageProcessor(self._commands, self, self._terminal)
         #: Levels of MS3 MS2 MS1, bits 2 to 0: low until a driver's table says otherwise.
-        self._microstep_pins = 0
+        self.microstep_pins = 0
         self._network.set_up(memory)
         self._reset_session()
         if cold:
@@ -118,6 +120,8 @@ class SacNode:
         """Bytes from the line."""
         self._now = now
         self._network.hear(heard)
+        if self._pins is not None:
+            self._pins.look(now)
 
     def wake_at(self) -> Ns | None:
         """The next answer or packet to send, the end of the command that runs, or of a boot."""
@@ -135,6 +139,8 @@ class SacNode:
         if self._start is not None:
             self._end_boot(self._start, now)
         self._commands.wake(now)
+        if self._pins is not None:
+            self._pins.look(now)
         return self._network.wake(now)
 
     def state(self, now: Ns) -> str:
@@ -211,6 +217,8 @@ class SacNode:
             self._commands.execute(Stop(grace=False), now)
             self._network.listen_from(None)
             self._start = OFF
+        if self._pins is not None:
+            self._pins.look(now)
 
     def reboot(self, now: Ns) -> None:
         """The warm boot of ``$R``: parameters anew from EEPROM; queue and motor stay.
@@ -232,10 +240,10 @@ class SacNode:
         memory = self._memory
         #: Whether the encoder turns the speed of continuous motion (EnT), or steps the motor (EnF).
         self.throttles = False
-        self._commands.switch_ops(on=bool(memory.soft_ops))
+        self.send_soft_ops(on=bool(memory.soft_ops))
         pins = memory.microstep_pins
         if pins is not None:
-            self._microstep_pins = pins
+            self.microstep_pins = pins
         else:
             self.tell(
                 ReportKind.WARNING,
@@ -246,7 +254,8 @@ class SacNode:
     def _end_boot(self, start: Start, now: Ns) -> None:
         if start.over is None or start.over > now:
             return
-        if start.restores or (start.listens and not self.rst):
+        reset = self._pins is not None and not self._pins.rst
+        if start.restores or (start.listens and reset):
             self.write(self._factory_memory())
             self._boot(now, cold=False)
         self._start = None
@@ -275,9 +284,20 @@ class SacNode:
         """Its network port."""
         return self._network
 
-    def pins(self, now: Ns) -> Outputs:
-        """Levels of its output pins at ``now``."""
-        return outputs(self._memory, self._engine, self._microstep_pins, now)
+    @property
+    def engine(self) -> Engine:
+        """Its motion engine."""
+        return self._engine
+
+    @property
+    def obeyed(self) -> Memory:
+        """The memory that it booted with."""
+        return self._memory
+
+    @property
+    def booted(self) -> bool:
+        """Whether it runs: switched on, and its boot is over."""
+        return self._start is None
 
     # ---- the terminal ----
 
@@ -293,6 +313,8 @@ class SacNode:
         self._now = now
         if self._start is None or not self._start.key():
             self.terminal.take(keys, now)
+        if self._pins is not None:
+            self._pins.look(now)
 
     def line_typed(self, line: bytes, now: Ns) -> None:
         """A line was typed at the terminal port."""
@@ -305,7 +327,7 @@ class SacNode:
             gap=commands.gap,
             debug=commands.debug,
             throttle=self.throttles,
-            soft_ops=commands.soft_ops,
+            soft_ops=self.soft_ops,
             ack=network.ack,
             crc=network.crc,
             source=self._messages.last_source,
@@ -314,6 +336,24 @@ class SacNode:
 
     # ---- pins ----
 
+    @property
+    def pins(self) -> SacPins:
+        """Its pins, made when they are first asked for: most nodes have nothing wired to them."""
+        if self._pins is None:
+            self._pins = SacPins(self)
+        return self._pins
+
+    def send_soft_ops(self, *, on: bool) -> None:
+        """Tell the network of the starts and ends of commands, or no longer."""
+        #: Whether they are told of over the network.
+        self.soft_ops = on
+        self.watch_ops()
+
+    def watch_ops(self) -> None:
+        """See anew whether anybody is to be told of starts and ends of commands."""
+        watched = self._pins is not None and self._pins.watched
+        self._commands.switch_ops(on=self.soft_ops or watched)
+
     def feed_xclk(self, hz: int, now: Ns) -> None:
         """From ``now`` on a clock of ``hz`` comes to the xclk pin; 0: no edges.
 
@@ -321,7 +361,7 @@ class SacNode:
         bus has the bus ask the node anew when it wants to be woken.
         """
         self._now = now
-        self._xclk_hz = hz
+        self.xclk_hz = hz
         clock = self._external_clock()
         if clock is not None:
             self._commands.set_clock(clock, now)
@@ -329,7 +369,7 @@ class SacNode:
     def _external_clock(self) -> Timebase | None:
         """What times pulses instead of the oscillator; None when nothing does."""
         memory = self._memory
-        return None if memory.clock else Timebase.external(memory.xfreq, self._xclk_hz)
+        return None if memory.clock else Timebase.external(memory.xfreq, self.xclk_hz)
 
     def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         """A packet was accepted."""
@@ -337,6 +377,8 @@ class SacNode:
 
     def tell_ops(self, *, start: bool, at: Ns) -> Ns:
         """Soft ops tell everybody that a command starts or ends; when that will be out."""
+        if not self.soft_ops:
+            return at  # the op pins alone are watched
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
     def tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:

@@ -68,6 +68,10 @@ class Board(Protocol):
         """Put this into the EEPROM."""
         ...
 
+    def send_soft_ops(self, *, on: bool) -> None:
+        """Tell the network of the starts and ends of commands, or no longer."""
+        ...
+
     def reboot(self, now: Ns) -> None:
         """A warm boot."""
         ...
@@ -114,7 +118,7 @@ def _obey_system(command: SystemCommand, board: Board, now: Ns) -> None:
         case ToggleEncoder():
             board.throttles = not board.throttles
         case SendSoftOps(on):
-            commands.switch_ops(on=on)
+            board.send_soft_ops(on=on)
         case Reboot():
             board.reboot(now)
         case Configure() | ShowMemory():
