@@ -233,6 +233,7 @@ class SacNode:
         self._engine.change_microsteps(before.ustep, memory.ustep)
         self._network.set_up(memory)
         self._reset_session()
+        self._show_prompt()
         self._start = Start(now)
 
     def _reset_session(self) -> None:
@@ -259,10 +260,14 @@ class SacNode:
             self.write(self._factory_memory())
             self._boot(now, cold=False)
         self._start = None
-        if self._terminal is not None:
-            self._terminal.restart()
+        if start.listens:
+            self._show_prompt()
         if self._memory.autorun:
             self._commands.autorun(self._memory.autorun, now)
+
+    def _show_prompt(self) -> None:
+        if self._terminal is not None:
+            self._terminal.restart()
 
     def _drive(self) -> Drive:
         settings = self._settings
@@ -309,9 +314,9 @@ class SacNode:
         return self._terminal
 
     def keys_typed(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive at the terminal port."""
+        """Keys arrive at the terminal port; a cold boot that is under way takes them all."""
         self._now = now
-        if self._start is None or not self._start.key():
+        if keys and (self._start is None or not self._start.key()):
             self.terminal.take(keys, now)
         if self._pins is not None:
             self._pins.look(now)
