@@ -188,6 +188,7 @@ class RealHost:
         # From when this began: what the clock has gone on meanwhile passes on the bus too.
         if kernel.now > now:
             self._bus_anchor += kernel.now - now
+            self._timer_for = None  # the timer that stands would fire too late now
 
     def _arm(self) -> None:
         """Have the loop call when the next event is due."""

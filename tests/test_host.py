@@ -323,6 +323,22 @@ def test_without_pace_motion_still_keeps_the_time_of_the_clock() -> None:
     assert states == ["ACCEL", "DECEL", "STANDBY"]
 
 
+def test_without_pace_what_stands_already_comes_as_much_earlier_as_the_line_ran_ahead() -> None:
+    bench = Bench()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        bench.kernel.at(SECOND, lambda: None)
+        host = RealHost(bench.kernel, loop, line_free_at=lambda: bench.bus.medium.free_at(0))
+        host.arrive(bench.port.talk, packet("v100"))
+        assert bench.kernel.now > 3 * MS
+        await asyncio.sleep(1)
+        assert host.lateness.count == 1
+        assert host.lateness.worst < US
+        host.close()
+
+    beside(Kernel(), main)
+
+
 # ---- virtual ------------------------------------------------------------------------------------
 
 
