@@ -27,7 +27,17 @@ from typing import Protocol as Contract
 from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from sacbus.lateness import Lateness
 
-__all__ = ["BEHIND", "Host", "RealHost", "Standstill", "VirtualHost", "VirtualLoop", "run_virtual"]
+__all__ = [
+    "BEHIND",
+    "LEAD",
+    "LEISURE",
+    "Host",
+    "RealHost",
+    "Standstill",
+    "VirtualHost",
+    "VirtualLoop",
+    "run_virtual",
+]
 
 _T = TypeVar("_T")
 _Ts = TypeVarTuple("_Ts")
@@ -68,7 +78,7 @@ class Host(Contract):
         ...
 
     def spare(self) -> float:
-        """Seconds of wall time until something on the bus must be punctual; ``inf``: nothing."""
+        """Seconds of wall time until an event that is not quiet is due; ``inf`` when none ever is."""
         ...
 
     def close(self) -> None:

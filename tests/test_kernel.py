@@ -197,9 +197,7 @@ def test_whatever_is_scheduled_runs_by_time_and_then_by_order(
 # ---- quiet events -------------------------------------------------------------------------------
 
 
-def test_quiet_events_and_others_of_one_instant_run_in_the_order_in_which_they_were_scheduled() -> (
-    None
-):
+def test_quiet_events_and_others_of_one_instant_run_in_the_order_of_their_scheduling() -> None:
     kernel = Kernel()
     ran: list[int] = []
     for number in range(50):
