@@ -78,7 +78,7 @@ class Host(Contract):
         ...
 
     def spare(self) -> float:
-        """Seconds of wall time until an event that is not quiet is due; ``inf`` when none ever is."""
+        """Seconds of wall time until the next event that is not quiet; ``inf`` without one."""
         ...
 
     def close(self) -> None:
