@@ -215,6 +215,17 @@ class Node(Contract):
         """Its pins, made when first asked for; None for a kind without any."""
         ...
 
+    @property
+    def quiet(self) -> bool:
+        """True while it will send nothing until it hears something or is touched (``Bus.touch``).
+
+        What it does then when it is woken shows nowhere but in how it looks, and whoever looks
+        brings the bus up to date first. So in real time the bus may let it wait for some ms; by
+        bus time it is woken as exactly as ever. What it reports then is told as late, with the
+        time at which it was. Where in doubt, False: that costs a wake-up of the process each time.
+        """
+        ...
+
     def hear(self, heard: Heard, now: Ns) -> None:
         """Bytes have arrived; ``now`` is when the last of them ended."""
         ...

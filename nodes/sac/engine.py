@@ -63,7 +63,6 @@ class Engine:
         "_anchor",
         "_entry",
         "_left",
-        "oscillator",
         "_profile",
         "_rest",
         "_sign",
@@ -71,6 +70,7 @@ class Engine:
         "_tick",
         "clock",
         "end",
+        "oscillator",
         "started",
     )
 

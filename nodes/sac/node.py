@@ -116,6 +116,11 @@ class SacNode:
         """True while its receiver stands open."""
         return self._network.receiving
 
+    @property
+    def quiet(self) -> bool:
+        """True while it has nothing to send; with soft ops, ends of commands are sent too."""
+        return self._network.due is None and not self._memory.soft_ops
+
     def hear(self, heard: Heard, now: Ns) -> None:
         """Bytes from the line."""
         self._now = now
