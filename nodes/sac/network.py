@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
-from nodes.sac.memory import Memory, name_of, port_on_line
+from nodes.sac.memory import Memory
 from nodes.sac.robust import RobustReceiver
 from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
@@ -40,10 +40,6 @@ __all__ = ["NetworkPort", "PortOwner"]
 #: For a message of its own the driver is enabled this long before the first bit (measured 5-11 us).
 ENABLE_LEAD: Final[Ns] = 8_000
 
-
-#: Per cent that two rates may differ: a receiver that samples in the middle of the last bit of ten
-#: is wrong beyond 5 %, and half of that is what data sheets leave to each side.
-TOLERANCE: Final = 2.5
 
 #: Deaf until this is deaf for good.
 _FOR_EVER: Final[Ns] = 2**63
@@ -141,23 +137,20 @@ class NetworkPort:
         #: When something is to be sent next; None when nothing is.
         self.due: Ns | None = None
 
-    def set_up(self, memory: Memory) -> None:
-        """Take address, rate and switches from memory, as at a boot.
+    def set_up(self, memory: Memory, rate: LineRate, *, garbles: bool = False) -> None:
+        """Take address and switches from memory, as at a boot; ``rate`` is that of its line.
 
-        An answer that waits still goes out: it was the answer of the old address.
+        ``garbles``: it is set to another rate than its line's. An answer that waits still goes out:
+        it was the answer of the old address.
         """
         self.ack = bool(memory.ack)
         self.crc = bool(memory.crc)
         self.address = self._receiver.address = memory.d_id
-        baud = self._rate.baud
-        self._garbles = abs(memory.rate - baud) * 100 > TOLERANCE * baud
-        if self._garbles:
+        self._rate = rate
+        self._answer_span = rate.span(ANSWER_BYTES)
+        self._garbles = garbles
+        if garbles:
             self._deaf_until = _FOR_EVER
-            self._owner.tell(
-                ReportKind.WARNING,
-                f"{name_of(port_on_line(memory.network))} is {memory.rate} baud, the line runs at "
-                f"{baud}: it hears nothing, and nobody understands it",
-            )
         elif self._deaf_until == _FOR_EVER:
             self._deaf_until = 0
 

@@ -15,6 +15,7 @@ from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
 from nodes.sac.pins import SacPins
+from nodes.sac.ports import Exchanged, HardwarePort, understand
 from nodes.sac.queries import Query, answer
 from nodes.sac.screens import Flags
 from nodes.sac.settings import SacSettings
@@ -40,6 +41,8 @@ class SacNode:
         "_commands",
         "_configured",
         "_engine",
+        "_exchanged",
+        "_hardware",
         "_memory",
         "_messages",
         "_network",
@@ -66,7 +69,11 @@ class SacNode:
         self._rate = rate
         self._tell_bus = tell
         self._now: Ns = 0
+        #: Both made when they are first asked for: most nodes never have a user there.
         self._terminal: TerminalPort | None = None
+        self._hardware: HardwarePort | None = None
+        #: While the two ports have each other's role.
+        self._exchanged: Exchanged | None = None
         #: Frequency of the clock at the xclk pin.
         self.xclk_hz = settings.xclk_hz
         self._pins: SacPins | None = None
@@ -96,7 +103,7 @@ class SacNode:
         self._messages = MessageProcessor(self._commands, self, self._terminal)
         #: Levels of MS3 MS2 MS1, bits 2 to 0: low until a driver's table says otherwise.
         self.microstep_pins = 0
-        self._network.set_up(memory)
+        self._set_up_ports()
         self._reset_session()
         if cold:
             self._network.listen_from(now + LISTENS)
@@ -114,17 +121,20 @@ class SacNode:
     @property
     def receiving(self) -> bool:
         """True while its receiver stands open."""
-        return self._network.receiving
+        return self._network.receiving or self._exchanged is not None
 
     @property
     def quiet(self) -> bool:
-        """True while it has nothing to send; with soft ops, ends of commands are sent too."""
-        return self._network.due is None and not self._memory.soft_ops
+        """True while it has nothing to send, and nobody is to be told of starts and ends."""
+        return self._network.due is None and not self._commands.tells_ops and self._start is None
 
     def hear(self, heard: Heard, now: Ns) -> None:
         """Bytes from the line."""
         self._now = now
-        self._network.hear(heard)
+        if self._exchanged is None:
+            self._network.hear(heard)
+        else:
+            self.terminal_keys(self._exchanged.keys(heard), now)
         if self._pins is not None:
             self._pins.look(now)
 
@@ -133,6 +143,10 @@ class SacNode:
         if self._start is not None:
             return self._start.over
         sends = self._network.due
+        if self._exchanged is not None:
+            says = self._exchanged.due
+            if says is not None and (sends is None or says < sends):
+                sends = says
         ends = self._commands.due
         if sends is None:
             return ends
@@ -146,7 +160,12 @@ class SacNode:
         self._commands.wake(now)
         if self._pins is not None:
             self._pins.look(now)
-        return self._network.wake(now)
+        data = self._network.wake(now)
+        if self._exchanged is None:
+            return data
+        if data and self._hardware is not None and self._hardware.show is not None:
+            self._hardware.show(data)
+        return self._exchanged.say(now)
 
     def state(self, now: Ns) -> str:
         """What the engine does; SYNC while a command is held that has not begun; OFF."""
@@ -236,7 +255,7 @@ class SacNode:
         self._commands.reboot(Session.start(memory.defaults()), self._drive(), now)
         self._commands.set_clock(self._external_clock() or self._settings.oscillator, now)
         self._engine.change_microsteps(before.ustep, memory.ustep)
-        self._network.set_up(memory)
+        self._set_up_ports()
         self._reset_session()
         self._show_prompt()
         self._start = Start(now)
@@ -309,26 +328,74 @@ class SacNode:
         """Whether it runs: switched on, and its boot is over."""
         return self._start is None
 
-    # ---- the terminal ----
+    # ---- the ports ----
+
+    def _set_up_ports(self) -> None:
+        """Give the two ports their roles and rates."""
+        memory, line = self._memory, self._rate
+        hears = understand(memory.sw, line.baud)
+        if not hears:
+            self.tell(
+                ReportKind.WARNING,
+                f"sw is {memory.sw} baud, the line runs at {line.baud}: it hears nothing, and "
+                "nobody understands it",
+            )
+        if memory.network:
+            rate = LineRate(memory.hw, line.bits)
+            self._network.set_up(memory, rate)
+            self._exchanged = Exchanged(self._network, rate, line, hears=hears)
+        else:
+            self._network.set_up(memory, line, garbles=not hears)
+            self._exchanged = None
 
     @property
-    def terminal(self) -> TerminalPort:
-        """Its terminal port, made when it is first asked for: most nodes never have a user."""
+    def terminal(self) -> HardwarePort:
+        """Its hardware port, where its terminal is (``ports.py``)."""
+        if self._hardware is None:
+            self._hardware = HardwarePort(self)
+            self._terminal_port()
+        return self._hardware
+
+    def hardware_keys(self, keys: bytes, now: Ns) -> None:
+        """Bytes arrive at the hardware port."""
+        if self._exchanged is None:
+            self.terminal_keys(keys, now)
+            return
+        self._now = now
+        self._exchanged.hear(keys, now)
+        if self._pins is not None:
+            self._pins.look(now)
+
+    def terminal_keys(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive at the terminal, on whichever port; a boot under way takes them all."""
+        self._now = now
+        if keys and (self._start is None or not self._start.key()):
+            self._terminal_port().take(keys, now)
+        if self._pins is not None:
+            self._pins.look(now)
+
+    def show(self, text: bytes) -> None:
+        """What the terminal prints."""
+        if self._exchanged is not None:
+            self._exchanged.print(text)
+        elif self._hardware is not None and self._hardware.show is not None:
+            self._hardware.show(text)
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody is at the far end of the terminal."""
+        if self._exchanged is not None:
+            return self._exchanged.hears
+        return self._hardware is not None and self._hardware.show is not None
+
+    def _terminal_port(self) -> TerminalPort:
         if self._terminal is None:
             self._terminal = self._messages.terminal = TerminalPort(self)
         return self._terminal
 
-    def keys_typed(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive at the terminal port; a cold boot that is under way takes them all."""
-        self._now = now
-        if keys and (self._start is None or not self._start.key()):
-            self.terminal.take(keys, now)
-        if self._pins is not None:
-            self._pins.look(now)
-
     def line_typed(self, line: bytes, now: Ns) -> None:
         """A line was typed at the terminal port."""
-        self._messages.terminal_line(line, self.terminal, now)
+        self._messages.terminal_line(line, self._terminal_port(), now)
 
     def answer(self, query: Query) -> list[str]:
         """What a query shows on the terminal."""

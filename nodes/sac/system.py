@@ -60,6 +60,11 @@ class Board(Protocol):
         ...
 
     @property
+    def watched(self) -> bool:
+        """Whether anybody is at the far end of its terminal."""
+        ...
+
+    @property
     def eeprom(self) -> Memory:
         """What its EEPROM holds now; obeyed after the next boot."""
         ...

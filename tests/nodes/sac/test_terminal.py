@@ -45,6 +45,13 @@ class Console:
         bench.kernel.run_until(bench.kernel.now + 20 * MS)
         return self.shown[begin:].decode("latin-1")
 
+    @property
+    def mode(self) -> Mode:
+        """The mode that the terminal is in."""
+        terminal = self.bench.node._terminal
+        assert terminal is not None
+        return terminal.mode
+
     def queue(self) -> QueueScreen:
         screen = QueueScreen.read(self.types("q\r"))
         assert screen is not None
@@ -214,7 +221,7 @@ def test_the_queue_is_edited_in_its_program_mode(console: Console) -> None:
     assert [report.line for report in console.bench.told()] == ["m2000"]
     assert console.types("S\r") == lines("S")
     assert console.types("x\r") == lines("x")
-    assert console.terminal.mode is Mode.PROMPT
+    assert console.mode is Mode.PROMPT
     assert [row.position for row in console.queue().rows if row.motion.steps == 2000] == [8]
 
 
@@ -374,7 +381,7 @@ def test_a_warm_boot_shows_one_prompt_and_drops_what_was_typed(console: Console)
     console.bench.hears("$R", at=SECOND)
     console.bench.run()
     assert console.shown[begin:] == b"\r\nSAC>"
-    assert console.terminal.mode is Mode.PROMPT
+    assert console.mode is Mode.PROMPT
     assert console.types("vd\r") == lines("vd", "100 RPM  cycle 3000")
 
 
@@ -478,4 +485,4 @@ def test_nothing_that_is_typed_or_sent_raises(typed: list[bytes], sent: list[byt
             node._messages.network_line(body, 7, NODE, console.bench.kernel.now)
             console.bench.bus.touch(node)
     assert console.types(b"\r\rX\r\r").endswith("SAC>")
-    assert console.terminal.mode is Mode.PROMPT
+    assert console.mode is Mode.PROMPT
