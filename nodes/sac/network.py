@@ -132,7 +132,7 @@ class NetworkPort:
     def set_up(self, memory: Memory) -> None:
         """Take address, rate and switches from memory, as at a boot.
 
-        An answer that waits still goes out: it was the answer of the old address.
+        An answer that waits still goes out as it is: that of ``$R`` itself.
         """
         self.ack = bool(memory.ack)
         self.crc = bool(memory.crc)
@@ -182,6 +182,8 @@ class NetworkPort:
     def send(self, dest: int, body: bytes, not_before: Ns) -> Ns:
         """Queue a packet of the node's own; when it will be out, if nothing comes between."""
         data = encode(dest, self.address, body, crc=self.crc)
+        if self._garbles:
+            data = data.translate(_GARBLED)
         begins = max(not_before, self._busy_until())
         self._outbox.append((not_before, data))
         self._see_what_is_due()
@@ -214,7 +216,7 @@ class NetworkPort:
             data = self._outbox.pop(0)[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
         self._see_what_is_due()
-        return data.translate(_GARBLED) if self._garbles else data
+        return data
 
     def _busy_until(self) -> Ns:
         """When the answer that waits, or is on its way, is out, and a packet may follow."""

@@ -225,6 +225,8 @@ class SacNode:
         self._engine.change_microsteps(before.ustep, memory.ustep)
         self._network.set_up(memory)
         self._reset_session()
+        if self._terminal is not None:
+            self._terminal.restart()
         self._start = Start(now)
 
     def _reset_session(self) -> None:
@@ -250,7 +252,7 @@ class SacNode:
             self.write(self._factory_memory())
             self._boot(now, cold=False)
         self._start = None
-        if self._terminal is not None:
+        if start.listens and self._terminal is not None:
             self._terminal.restart()
         if self._memory.autorun:
             self._commands.autorun(self._memory.autorun, now)
