@@ -26,6 +26,9 @@ __all__ = [
     "Decoder",
     "Heard",
     "KindError",
+    "MemoryTable",
+    "MemoryValue",
+    "MemoryWords",
     "Node",
     "NodeKind",
     "NodeSettings",
@@ -359,6 +362,35 @@ class NodeSettings:
     given: frozenset[str] = field(default=frozenset(), init=False, repr=False, compare=False)
 
 
+@dataclass(frozen=True, slots=True)
+class MemoryValue:
+    """One value of a memory, for people. ``key``: what sets it. ``factory``: None if it is that."""
+
+    key: str
+    name: str
+    value: str
+    meaning: str
+    factory: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryTable:
+    """A part of a memory that has rows, each with a cell for every column."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryWords:
+    """A node's memory in words; ``remarks`` are sentences about values that no node would take."""
+
+    values: tuple[MemoryValue, ...]
+    tables: tuple[MemoryTable, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
 class NodeKind(Contract):
     """A kind of node, as an entry point of the group ``sacbus.nodes`` gives it."""
 
@@ -390,6 +422,10 @@ class NodeKind(Contract):
         tell: Callable[[Report], None],
     ) -> Node:
         """A new node with factory memory; ``tell`` takes what it reports out of band."""
+        ...
+
+    def memory_words(self, memory: Mapping[str, object], address: int | None) -> MemoryWords:
+        """What :meth:`Node.persist` gave, in words. ``address``: the configured one, if known."""
         ...
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from nodes.sac.node import SacNode
 from nodes.sac.protocol import SAC_PROTOCOL, SacProtocol
 from nodes.sac.settings import SacSettings
+from nodes.sac.words import memory_words
 from sacbus.kernel import LineRate
-from sacbus.node import Report
+from sacbus.node import MemoryWords, Report
 
 __all__ = ["KIND", "SacKind", "SacNode", "SacProtocol", "SacSettings"]
 
@@ -27,6 +28,10 @@ class SacKind:
     ) -> SacNode:
         """A node with factory memory at ``address``."""
         return SacNode(address, settings, rate, tell)
+
+    def memory_words(self, memory: Mapping[str, object], address: int | None) -> MemoryWords:
+        """Parameters, pin map and saved queue in words."""
+        return memory_words(memory, address)
 
 
 KIND: Final = SacKind()

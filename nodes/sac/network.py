@@ -140,8 +140,8 @@ class NetworkPort:
     def set_up(self, memory: Memory, rate: LineRate, *, garbles: bool = False) -> None:
         """Take address and switches from memory, as at a boot; ``rate`` is that of its line.
 
-        ``garbles``: it is set to another rate than its line's. An answer that waits still goes out:
-        it was the answer of the old address.
+        ``garbles``: it is set to another rate than its line's. An answer that waits still goes out
+        as it is: that of ``$R`` itself.
         """
         self.ack = bool(memory.ack)
         self.crc = bool(memory.crc)
@@ -187,6 +187,8 @@ class NetworkPort:
     def send(self, dest: int, body: bytes, not_before: Ns) -> Ns:
         """Queue a packet of the node's own; when it will be out, if nothing comes between."""
         data = encode(dest, self.address, body, crc=self.crc)
+        if self._garbles:
+            data = data.translate(_GARBLED)
         begins = max(not_before, self._busy_until())
         self._outbox.append((not_before, data))
         self._see_what_is_due()
@@ -220,7 +222,7 @@ class NetworkPort:
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
         self._enabled_until = self._sent_until
         self._see_what_is_due()
-        return data.translate(_GARBLED) if self._garbles else data
+        return data
 
     def sends(self, now: Ns) -> int:
         """The level of the tx_en pin: 1 while the driver is enabled, from before the first bit."""

@@ -17,6 +17,7 @@ import click
 
 from sacbus import __version__
 from sacbus.cli.check import check_command
+from sacbus.cli.eeprom import eeprom_group
 from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
 from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, verbose
@@ -54,6 +55,7 @@ for command in (
     monitor_command,
     plan_command,
     check_command,
+    eeprom_group,
     kinds_command,
 ):
     root.add_command(command)
