@@ -36,6 +36,7 @@ __all__ = [
     "Setting",
     "SettingError",
     "Snapshot",
+    "Terminal",
     "find_kind",
     "kind_names",
     "kinds",
@@ -133,6 +134,17 @@ class Snapshot:
     rotor_steps: float | None = None
 
 
+class Terminal(Contract):
+    """A node's terminal port: keys in, text out; a dumb terminal, no packets."""
+
+    #: Takes what the port prints, at once; None while nobody is connected: what is printed is lost.
+    show: Callable[[bytes], None] | None
+
+    def type(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive. The owner asks the bus to touch the node afterwards (Bus.touch)."""
+        ...
+
+
 class Node(Contract):
     """A device on the bus: a synchronous state machine that is told the time.
 
@@ -174,6 +186,11 @@ class Node(Contract):
 
     def snapshot(self, now: Ns) -> Snapshot:
         """What can be seen of it at ``now``; changes nothing."""
+        ...
+
+    @property
+    def terminal(self) -> Terminal | None:
+        """Its terminal port, made when first asked for; None for kinds without."""
         ...
 
     def persist(self) -> Mapping[str, int]:

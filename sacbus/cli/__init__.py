@@ -23,6 +23,7 @@ from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, verbose
 from sacbus.cli.plan import plan_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
+from sacbus.cli.terminal import terminal_command
 
 __all__ = ["main", "run"]
 
@@ -51,6 +52,7 @@ def root(context: click.Context) -> int | None:
 for command in (
     serve_command,
     send_command,
+    terminal_command,
     monitor_command,
     plan_command,
     check_command,
