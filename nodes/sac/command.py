@@ -1,411 +1,448 @@
-"""The command processor: the queue, what is pending, and which command runs now.
+"""The command processor: which command runs now, and which one next.
 
-Owns the session defaults, the 30 queue positions, the order of execution, sync, start wait, GAP and
-the stops. Turns commands into profiles (``sacbus.motion``) and gives them to the engine; what a
-line means is the message processor's business. Time is an argument, in ns.
-Source: manual, "Command buffer", "Motion", "Continuous", "GAP", "sync"; spec, commands and motion.
+Owns the session defaults and the order of execution: the queue (``queue.py``), loops (``loop.py``)
+and what goes before both, by the table in ``order.py``. How a command is started and ended is
+``execution.py``'s business, what a line means the message processor's. Time is an argument, in ns.
+
+What comes next is worked out when nothing runs: first what goes before all else, X or continuous
+motion (of several that come while the present pulse ends, the newest); then a loop; then what is
+pending in the queue.
+Source: manual, "Command buffer", "Motion", "Loop", "xRef", "Continuous", "Throw-away"; spec,
+commands.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
-from typing import Final, Protocol, assert_never
+from typing import assert_never
 
 from nodes.sac.engine import Engine
+from nodes.sac.execution import Execution, Ops, TellOfCommand, shortest
+from nodes.sac.loop import Loop
+from nodes.sac.order import RULES, Cue, LoopFate, Present, Source
+from nodes.sac.queue import CONTINUOUS_POSITION, THROW_AWAY_POSITION, Queue
 from sacbus.kernel import Ns
 from sacbus.language import (
+    QUEUE_LENGTH,
     Acceleration,
+    ClearQueue,
     Deceleration,
-    Defaults,
+    EditQueue,
+    EndLoop,
+    LoopCount,
+    LoopFinish,
+    LoopQueue,
+    LoopStart,
     Motion,
     Move,
     Next,
     ReleaseSync,
+    RunPosition,
+    RunReferences,
     Session,
-    ShowVelocity,
+    SetReference,
     SinglePulses,
     Stop,
+    ThrowAway,
+    ToggleDebug,
+    ToggleGap,
+    Undo,
     Velocity,
+    cleared_row,
+    edited,
 )
-from sacbus.motion import (
-    TICKS_PER_US,
-    Drive,
-    Profile,
-    Rpm,
-    Timebase,
-    gap_passes,
-    load_ticks,
-    plan,
-)
+from sacbus.motion import Drive, Timebase
 from sacbus.node import ReportKind
 
-__all__ = ["QUEUE_LENGTH", "CommandProcessor", "MotionCommand", "shortest"]
+__all__ = ["CommandProcessor", "Obeyed", "shortest"]
 
-#: Positions of the command queue (manual, "Throw-away").
-QUEUE_LENGTH: Final = 30
-
-#: The commands that end here; a message processor deals with the others itself.
-MotionCommand = (
+#: The commands that end here; what shows something, and the system's, are others' business.
+Obeyed = (
     Move
+    | ThrowAway
     | Velocity
-    | ShowVelocity
     | Acceleration
     | Deceleration
     | Stop
     | Next
     | ReleaseSync
     | SinglePulses
+    | EditQueue
+    | ClearQueue
+    | LoopStart
+    | LoopFinish
+    | LoopCount
+    | LoopQueue
+    | EndLoop
+    | RunReferences
+    | RunPosition
+    | SetReference
+    | ToggleGap
+    | ToggleDebug
+    | Undo
 )
 
 
-class SoftOps(Protocol):
-    """Tells the network that a command starts or ends."""
-
-    def __call__(self, *, start: bool, at: Ns) -> Ns:
-        """Have it told at ``at`` or as soon after as may be; when that will be out."""
-        ...
-
-
-class TellOfCommand(Protocol):
-    """Takes what is worth a report."""
-
-    def __call__(self, kind: ReportKind, text: str, command: str | None = None, /) -> None:
-        """``command`` is what it is about; None: the line that has just come."""
-        ...
-
-
 class CommandProcessor:
-    """Executes commands on an engine.
-
-    ``soft_ops`` is None when they are off. ``tell`` takes what is worth a report.
-    """
+    """Executes commands on an engine. ``tell`` takes what is worth a report."""
 
     __slots__ = (
-        "_current",
-        "_drive",
+        "_barred",
         "_engine",
-        "_free",
-        "_held",
-        "_held_at",
-        "_held_loaded",
-        "_kept_rpm",
-        "_last",
-        "_last_end",
-        "_last_period",
-        "_pending",
-        "_position",
+        "_loop",
         "_preempting",
-        "_queue",
-        "_soft_ops",
-        "_stopping",
+        "_preempting_source",
+        "_run",
         "_tell",
-        "_untold",
-        "due",
+        "debug",
+        "queue",
         "session",
     )
 
-    def __init__(
-        self,
-        session: Session,
-        drive: Drive,
-        engine: Engine,
-        soft_ops: SoftOps | None,
-        tell: TellOfCommand,
-    ) -> None:
+    def __init__(self, session: Session, drive: Drive, engine: Engine, tell: TellOfCommand) -> None:
         self.session = session
-        self._drive = drive
+        self.queue = Queue(session.defaults)
+        #: Whether debug mode is on (B toggles it).
+        self.debug = False
+        self._run = Execution(drive, engine, session.defaults, tell)
         self._engine = engine
-        self._soft_ops = soft_ops
-        #: Whether soft ops have yet to tell of the start.
-        self._untold = False
         self._tell = tell
-        #: Positions 1 to 30. The manual's hidden position 0 keeps nothing: continuous motion is
-        #: thrown away.
-        self._queue: list[Motion | None] = [None] * (QUEUE_LENGTH + 1)
-        self._position = 1
-        #: Those that wait, in order: a list, since an empty deque takes as much as all else here.
-        self._pending: list[int] = []
-        self._current: Motion | None = None
-        self._held: Motion | None = None
-        #: Where in the queue the held command stands (None: nowhere), and when it was loaded.
-        self._held_at: int | None = None
-        self._held_loaded: Ns = 0
-        #: Continuous motion that begins as soon as what it cuts has ended.
+        #: Made when it is first asked for: most nodes never loop.
+        self._loop: Loop | None = None
+        #: What begins as soon as what it cuts has ended: continuous motion, or an X.
         self._preempting: Motion | None = None
-        #: When the node is free to load: now, or when its DC2 is out.
-        self._free: Ns = 0
-        self._kept_rpm: Rpm = 0
-        self._last_end: Ns = 0
-        self._last_period = 0
-        #: The command that was loaded last.
-        self._last: Motion | None = None
-        self._stopping = False
-        #: When the command that runs is over, or its start is to be told; None: never.
-        self.due: Ns | None = None
+        self._preempting_source = Source.ONCE
+        #: Whether nothing may start: e-stop is low.
+        self._barred = False
+
+    # ---- looking ----
 
     @property
     def current(self) -> Motion | None:
         """The command that runs, or waits for its start; None when none does."""
-        return self._current
+        return self._run.current
 
     @property
     def held(self) -> Motion | None:
         """The command that is held at sync."""
-        return self._held
+        return self._run.held
+
+    @property
+    def source(self) -> Source:
+        """Where the current or the held command comes from."""
+        return self._run.source
 
     @property
     def pending(self) -> list[Motion]:
-        """Commands that wait for their turn, in order."""
-        return [motion for at in self._pending if (motion := self._queue[at]) is not None]
+        """Commands that wait in the queue, in order."""
+        return self.queue.waiting()
+
+    @property
+    def gap(self) -> bool:
+        """Whether GAP testing is on."""
+        return self._run.gap
+
+    @property
+    def looping(self) -> bool:
+        """Whether a loop has commands to come, at once or when what goes before it is over."""
+        return self._loop is not None and self._loop.running
+
+    @property
+    def references(self) -> tuple[int, ...]:
+        """The xRef array as far as it was programmed; a 0 ends it."""
+        return () if self._loop is None else self._loop.references
+
+    @property
+    def due(self) -> Ns | None:
+        """When the command that runs is over, or its start is to be told; None: never."""
+        return self._run.due
+
+    # ---- what comes from outside ----
 
     def wake(self, now: Ns) -> None:
         """End the command that is over, and go on with the next."""
-        if self.due is None or self.due > now:
+        run = self._run
+        if run.due is None or run.due > now:
             return
-        if self._untold and self._engine.begun(now):
-            self._tell_start()
-        end = self._engine.end
-        if end is not None and end <= now:
-            self._finish(end)
+        end = run.wake(now)
+        if end is not None:
             self._load_next(end)
-        self._see_what_is_due()
+        run.see_what_is_due()
 
     def set_clock(self, clock: Timebase, now: Ns) -> None:
         """Pulses are timed by another clock from ``now`` on."""
-        self._engine.set_clock(clock, now)
-        self._see_what_is_due()
+        self._run.set_clock(clock, now)
+        self._run.see_what_is_due()
 
-    def _see_what_is_due(self) -> None:
-        self.due = self._engine.started if self._untold else self._engine.end
+    def tell_ops(self, ops: Ops | None) -> None:
+        """Have the starts and ends of commands told; None: no longer."""
+        self._run.tell_ops(ops)
+        self._run.see_what_is_due()
 
-    def execute(self, command: MotionCommand, now: Ns) -> None:
+    def bar(self, *, barred: bool, now: Ns) -> None:
+        """E-stop goes low: all stops, and nothing starts until it is high again."""
+        self._barred = barred
+        if barred:
+            self._obey(Cue.STOP, now)
+        else:
+            self._load_next(now)
+        self._run.see_what_is_due()
+
+    def throttle(self, change_rpm: int, now: Ns) -> None:
+        """Turn the speed of continuous motion up or down, never below 1 RPM."""
+        current = self._run.current
+        if current is not None and self._may_retarget():
+            rpm = max(1, current.rpm + change_rpm)
+            cycle_us = self.session.defaults.cycle_of(rpm)
+            self._retarget(replace(current, rpm=rpm, cycle_us=cycle_us, by_cycle=False), now)
+            self._run.see_what_is_due()
+
+    def autorun(self, finish: int, now: Ns) -> None:
+        """Loop from position 1 to this one, as after a boot."""
+        self._looping().run(1, min(finish, QUEUE_LENGTH))
+        self._load_next(now)
+        self._run.see_what_is_due()
+
+    def reboot(self, session: Session, drive: Drive, now: Ns) -> None:
+        """Stop, and go on with other parameters; the queue and the xRef array stay."""
+        self._obey(Cue.STOP, now)
+        self._run.see_what_is_due()
+        self.session = session
+        self.debug = False
+        self._run.reboot(drive, session.defaults, now)
+
+    # ---- commands ----
+
+    def execute(self, command: Obeyed, now: Ns) -> None:
         """Do what a command says, at ``now``."""
         if type(command) is Move:  # nearly all are, and this is much quicker than a match
             self._move(command, now)
         else:
             self._execute(command, now)
-        self._see_what_is_due()
+        self._run.see_what_is_due()
 
-    def _execute(self, command: MotionCommand, now: Ns) -> None:
+    def _execute(self, command: Obeyed, now: Ns) -> None:
         match command:
             case Move():
                 self._move(command, now)
+            case ThrowAway(move):
+                self._throw_away(move, now)
             case Velocity():
                 self.session = self.session.with_velocity(command)
-                self._retarget(now)
+                self._follow_session_velocity(now)
             case Acceleration():
                 self.session = self.session.with_acceleration(command)
             case Deceleration():
                 self.session = self.session.with_deceleration(command)
             case Stop(grace):
-                self._stop(grace, now)
+                self._obey(Cue.STOP, now, grace=grace)
             case Next(grace):
-                self._next(grace, now)
+                self._obey(Cue.NEXT, now, grace=grace)
+                self._load_next(now)
             case ReleaseSync():
-                self._release(now)
+                self._run.release(now)
             case SinglePulses(signs):
                 self._single_pulses(signs)
-            case ShowVelocity():
-                # It prints on the terminal alone (spec, "Two ports"); the network hears nothing.
-                self._tell(ReportKind.IGNORED, "a query is answered on the terminal only")
+            case ToggleGap():
+                self._run.gap = not self._run.gap
+            case ToggleDebug():
+                self.debug = not self.debug
+            case EditQueue(position, edit):
+                row = edited(self.queue.row(position), edit, self.session.defaults)
+                self.queue.write(position, row)
+            case ClearQueue():
+                self.queue.load([cleared_row(self.session)] * QUEUE_LENGTH)
+            case Undo():
+                if self.queue.undo() is None:
+                    self._ignored("no queue position has been written that could be put back")
+            case RunPosition(position):
+                self._go_before(self.queue.row(position), Source.ONCE, now)
+            case _:
+                self._execute_loop(command, now)
+
+    def _execute_loop(
+        self,
+        command: LoopStart
+        | LoopFinish
+        | LoopCount
+        | LoopQueue
+        | EndLoop
+        | RunReferences
+        | SetReference,
+        now: Ns,
+    ) -> None:
+        loop = self._looping()
+        match command:
+            case LoopStart(position):
+                if not loop.start_at(position):
+                    self._ignored(f"a loop that finishes at {position} must start elsewhere")
+            case LoopFinish(position):
+                if not loop.finish_at(position):
+                    self._ignored(f"a loop that starts at {position} must finish elsewhere")
+            case LoopCount(count):
+                loop.count_to(count)
+            case LoopQueue():
+                loop.run(1, QUEUE_LENGTH)
+            case RunReferences(count):
+                if not loop.run_references(count):
+                    self._ignored("the xRef array is empty or has no end: give its end a 0")
+            case SetReference(index, position):
+                loop.refer(index, position)
+            case EndLoop():
+                self._end_loop(loop, now)
             case _:
                 assert_never(command)
+        self._load_next(now)
 
     def _move(self, move: Move, now: Ns) -> None:
         """M: the next queue position, or continuous motion at once."""
         motion, self.session = self.session.resolve(move)
         if motion.steps is None:
-            self._preempt(motion, now)
+            self.queue.keep_hidden(CONTINUOUS_POSITION, motion)
+            self._go_before(motion, Source.CONTINUOUS, now)
             return
-        if len(self._pending) >= QUEUE_LENGTH:
+        lost = self.queue.add(motion)
+        if lost is not None:
             self._tell(
-                ReportKind.OVERRUN,
-                f"31 commands pending: queue position {self._position} overwritten",
+                ReportKind.OVERRUN, f"31 commands pending: queue position {lost} overwritten"
             )
+        if self._run.idle:
+            self._load_next(now)
+
+    def _throw_away(self, move: Move, now: Ns) -> None:
+        """XM: at once, and the session stays as it was."""
+        motion, _ = self.session.resolve(move)
+        if motion.steps is None:
+            self.queue.keep_hidden(CONTINUOUS_POSITION, motion)
+            self._go_before(motion, Source.CONTINUOUS, now)
         else:
-            self._pending.append(self._position)
-        self._queue[self._position] = motion
-        self._position = self._position % QUEUE_LENGTH + 1
+            self.queue.keep_hidden(THROW_AWAY_POSITION, motion)
+            self._go_before(motion, Source.ONCE, now)
+
+    def _go_before(self, motion: Motion, source: Source, now: Ns) -> None:
+        """Have a command run as soon as what it cuts has ended."""
+        self._put_held_back()
+        self._preempting = motion
+        self._preempting_source = source
+        if not self._run.stopping:  # what comes while the motor slows down waits for that
+            self._obey(Cue.CONTINUOUS if source is Source.CONTINUOUS else Cue.ONCE, now)
         self._load_next(now)
 
-    def _preempt(self, motion: Motion, now: Ns) -> None:
-        """Continuous motion goes before what is pending; what runs is cut, its velocity kept."""
-        if self._held is not None:
-            # It goes back to the head of what is pending, to be held again; if there is room.
-            held, self._held = self._held, None
-            if self._held_at is not None and self._queue[self._held_at] is held:
-                self._pending.insert(0, self._held_at)
-            else:
-                self._tell(
-                    ReportKind.OVERRUN,
-                    f"{shortest(held, self.session.defaults)} was held, and is overwritten",
-                )
-        self._preempting = motion
-        if not self._stopping:  # what comes while the motor slows down waits for that
-            self._cut(now)
-        self._load_next(now)
+    def _put_held_back(self) -> None:
+        """What is held goes back to where it came from, to be held again; if there is room."""
+        run = self._run
+        held, source = run.held, run.source
+        if held is None:
+            return
+        position = run.drop_held()
+        if source is Source.LOOP:
+            self._looping().again()
+        elif source is Source.QUEUE and position is not None and not self.queue.put_back(position):
+            self._tell(
+                ReportKind.OVERRUN,
+                f"{shortest(held, self.session.defaults)} was held, and is overwritten",
+            )
 
     def _load_next(self, now: Ns) -> None:
         """Load the next command if nothing runs, waits or is held."""
-        if self._current is not None or self._held is not None:
+        if not self._run.idle:
+            return
+        if self._barred:
+            if self._preempting is not None or self.looping or self.queue.pending:
+                self._tell(ReportKind.WARNING, "e-stop is low: nothing starts until it is high")
             return
         motion = self._preempting
-        position = None
         if motion is not None:
             self._preempting = None
-        elif self._pending:
-            position = self._pending.pop(0)
-            motion = self._queue[position]
-        if motion is None:
+            self._run.load(motion, self._preempting_source, None, now)
             return
-        load = self._engine.processing(load_ticks(_changes_acceleration(self._last, motion)))
-        self._last = motion
-        loaded = max(now, self._free) + load
-        if motion.sync:
-            self._held = motion
-            self._held_at = position
-            self._held_loaded = loaded
+        if self._loop is not None and (position := self._loop.take()) is not None:
+            self._run.load(self.queue.row(position), Source.LOOP, position, now)
+        elif self.queue.pending:
+            position = self.queue.pending.pop(0)
+            self._run.load(self.queue.row(position), Source.QUEUE, position, now)
+
+    def _obey(self, cue: Cue, now: Ns, *, grace: bool = False) -> None:
+        """Do what the table says to what runs, what is held, the loop, and what waits."""
+        run = self._run
+        rule = RULES[run.source, cue]
+        if self._loop is not None:
+            if rule.loop is LoopFate.ENDS:
+                self._loop.end()
+            elif rule.loop is LoopFate.ONE_MORE:
+                self._loop.only_one_more()
+        if not rule.waits:
+            self.queue.pending.clear()
+            self._preempting = None
+        match rule.present:
+            case Present.GOES_ON:
+                return
+            case Present.CUT:
+                run.cut(now)
+            case Present.ENDS if not grace:
+                run.cut(now)
+            case Present.ENDS | Present.SLOWS:
+                self._slow_down(now)
+            case Present.STOPS:
+                self._stop(now, grace=grace)
+            case _:
+                assert_never(rule.present)
+        run.drop_held()
+
+    def _slow_down(self, now: Ns) -> None:
+        """End what runs with its own deceleration."""
+        current = self._run.current
+        if current is not None:
+            self._run.slow_down(current.dec100, linear=current.linear, now=now)
+
+    def _stop(self, now: Ns, *, grace: bool) -> None:
+        run = self._run
+        run.forget_velocity()
+        if grace and run.current is not None:
+            run.stopping = True
+            run.slow_down(self.session.dec100, linear=self.session.linear, now=now)
+            run.stopping = run.current is not None  # it may not have begun
         else:
-            self._launch(motion, loaded, was_waiting=now <= self._last_end)
+            run.halt(now)
 
-    def _launch(self, motion: Motion, ready: Ns, *, was_waiting: bool) -> None:
-        """Plan a command that may start at ``ready``, and start it after its start wait.
-
-        Seamless when it may start within one more period of the last one's end: then it keeps the
-        velocity, and if it was waiting at that end, loading adds no time. Else it starts at slow.
-        """
-        engine = self._engine
-        wait = motion.wait_us * TICKS_PER_US
-        kept = self._kept_rpm
-        if kept:
-            late = engine.clock.ticks_in(ready - self._last_end) + wait
-            if not (engine.clock.runs and gap_passes(late, self._last_period)):
-                kept = 0
-            elif was_waiting and not wait:
-                ready = self._last_end
-        profile = plan(motion, self._drive, kept)
-        self._current = motion
-        engine.start(profile, ready, wait)
-        self._warn(profile)
-        if not engine.clock.runs:
-            self._tell(
-                ReportKind.WARNING,
-                "external clock: no edges come, so nothing moves before they do",
-                shortest(motion, self.session.defaults),
-            )
-        self._untold = self._soft_ops is not None
-
-    def _warn(self, profile: Profile) -> None:
-        for warning in profile.warnings:
-            self._tell(
-                ReportKind.WARNING, str(warning), shortest(profile.motion, self.session.defaults)
-            )
-
-    def _finish(self, end: Ns) -> None:
-        """House-keeping in STOP: the present command ends at ``end``."""
-        profile = self._engine.profile
-        if profile is None:
+    def _end_loop(self, loop: Loop, now: Ns) -> None:
+        """L: the loop ends after the present command; endless motion, wherever from, slows down."""
+        run = self._run
+        current, source = run.current, run.source
+        endless = current is not None and current.steps is None
+        if not endless and source is not Source.CONTINUOUS and not loop.set:
+            self._ignored("no loop runs, and no continuous motion")
             return
-        kept = self._kept_rpm = 0 if self._stopping else profile.kept_rpm
-        if kept:
-            self._last_end = end
-            self._last_period = profile.last_period
-        self._stopping = False
-        self._current = None
-        self._engine.finish(end)
-        if self._soft_ops is not None:
-            if self._untold:
-                self._tell_start()
-            self._free = self._soft_ops(start=False, at=end)
-            # The packet outlasts the gap (manual, "ops/soft_ops").
-            self._kept_rpm = 0
+        self._obey(Cue.END, now)
+        if endless and source is not Source.CONTINUOUS:
+            # A position of the queue that has 0 steps: to its end it would never come.
+            self._slow_down(now)
 
-    def _cut(self, now: Ns) -> None:
-        """End what runs with its present pulse, keeping its velocity (N, and what preempts)."""
-        if self._engine.profile is None:
-            return
-        if not self._engine.begun(now):
-            self._drop_unstarted()
-        else:
-            self._engine.change(lambda profile, at: profile.cut(at), now)
+    # ---- new velocities ----
 
-    def _drop_unstarted(self) -> None:
-        """The command's first pulse has not come: it never will."""
-        self._engine.discard()
-        self._current = None
-        self._untold = False
-
-    def _tell_start(self) -> None:
-        self._untold = False
-        at = self._engine.started
-        if self._soft_ops is not None and at is not None:
-            self._soft_ops(start=True, at=at)
-
-    def _slow_down(self, dec100: int, linear: bool, now: Ns) -> None:
-        if not self._engine.begun(now):
-            self._drop_unstarted()
-        else:
-            self._engine.change(
-                lambda profile, at: profile.slow_down(at, dec100, linear=linear), now
-            )
-
-    def _stop(self, grace: bool, now: Ns) -> None:
-        """S and s: nothing that is pending now will run; it stays in the queue."""
-        self._pending.clear()
-        self._preempting = None
-        self._held = None
-        self._kept_rpm = 0
-        if self._current is None:
-            return
-        if not self._engine.begun(now):
-            self._drop_unstarted()
-            return
-        self._stopping = True
-        if grace:
-            self._slow_down(self.session.dec100, self.session.linear, now)
-        else:
-            self._engine.change(lambda profile, at: profile.halt(at), now)
-            self._finish(now)
-
-    def _next(self, grace: bool, now: Ns) -> None:
-        """N and n: the present command ends, the next pending one follows."""
-        if self._held is not None:
-            self._held = None
-        elif self._current is not None:
-            if grace:
-                self._slow_down(self._current.dec100, self._current.linear, now)
-            else:
-                self._cut(now)
-        self._load_next(now)
-
-    def _release(self, now: Ns) -> None:
-        """y: the held command starts. Not remembered when nothing is held."""
-        held = self._held
-        if held is not None:
-            self._held = None
-            # It was loaded while it was held: nodes that one broadcast releases start together.
-            self._launch(held, max(now, self._held_loaded), was_waiting=False)
-
-    def _retarget(self, now: Ns) -> None:
+    def _follow_session_velocity(self, now: Ns) -> None:
         """A new session velocity re-targets continuous motion, with the session's acceleration."""
-        if self._preempting is not None:
+        if self._preempting is not None and self._preempting.steps is None:
             # It waits for the present pulse to end, and begins with the new velocity then.
             self._preempting = self._at_session_velocity(self._preempting)
-            return
-        current = self._current
-        profile = self._engine.profile
-        if current is None or current.steps is not None or profile is None:
-            return
-        if profile.duration is not None:
-            return  # it is coming to its end: S, s, N, n or another command was heard
-        target = self._current = self._at_session_velocity(current)
-        if not self._engine.begun(now):
-            self._engine.replace(plan(target, self._drive, profile.start_rpm))
-        else:
-            self._engine.change(lambda profile, at: profile.retarget(at, target), now)
-        if self._engine.profile is not None:
-            self._warn(self._engine.profile)
+        elif self._may_retarget() and self._run.current is not None:
+            self._retarget(self._at_session_velocity(self._run.current), now)
+
+    def _may_retarget(self) -> bool:
+        """Whether continuous motion runs, and is not coming to its end."""
+        profile = self._run.profile
+        current = self._run.current
+        return (
+            self._preempting is None
+            and current is not None
+            and current.steps is None
+            and profile is not None
+            and profile.duration is None
+        )
+
+    def _retarget(self, motion: Motion, now: Ns) -> None:
+        session = self.session
+        self._run.retarget(replace(motion, acc100=session.acc100, linear=session.linear), now)
 
     def _at_session_velocity(self, motion: Motion) -> Motion:
         session = self.session
@@ -418,41 +455,23 @@ class CommandProcessor:
             linear=session.linear,
         )
 
+    # ---- the rest ----
+
+    def step(self, pulses: int) -> bool:
+        """Single pulses, clockwise up; False while a command runs or waits, or e-stop is low."""
+        if self._run.current is not None or self._barred:
+            return False
+        self._engine.step(pulses)
+        return True
+
     def _single_pulses(self, signs: str) -> None:
-        if self._engine.profile is not None:
-            self._tell(
-                ReportKind.IGNORED,
-                "single pulses only while no command runs, or waits for its start",
-            )
-            return
-        self._engine.step(signs.count("+") - signs.count("-"))
+        if not self.step(signs.count("+") - signs.count("-")):
+            self._ignored("single pulses only while no command runs or waits, and e-stop is high")
 
+    def _looping(self) -> Loop:
+        if self._loop is None:
+            self._loop = Loop()
+        return self._loop
 
-def _changes_acceleration(last: Motion | None, motion: Motion) -> bool:
-    return (
-        last is None
-        or motion.acc100 != last.acc100
-        or motion.dec100 != last.dec100
-        or motion.linear != last.linear
-    )
-
-
-@lru_cache(maxsize=1_024)
-def shortest(motion: Motion, defaults: Defaults) -> str:
-    """A resolved command in the manual's shortest form, with all that shapes its profile.
-
-    Its velocity in RPM where that gives this very cycle, as ``v100`` gives 3000 us.
-    """
-    rpm = motion.rpm
-    by_rpm = rpm > 0 and defaults.cycle_of(rpm) == motion.cycle_us
-    return Move(
-        steps=motion.steps,
-        opposite=not motion.cw,
-        rpm=rpm if by_rpm else None,
-        cycle_us=None if by_rpm else motion.cycle_us,
-        acc100=motion.acc100,
-        dec100=motion.dec100,
-        linear=motion.linear or None,
-        extra_pulses=motion.extra_pulses or None,
-        pulses=motion.pulses or None,
-    ).text()
+    def _ignored(self, text: str) -> None:
+        self._tell(ReportKind.IGNORED, text)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from nodes.sac.command import CommandProcessor
+from nodes.sac.command import CommandProcessor, Obeyed
 from sacbus.kernel import Ns
 from sacbus.language import (
     Empty,
@@ -19,8 +19,8 @@ from sacbus.language import (
     Message,
     Move,
     Parsed,
+    ShowVelocity,
     SoftOp,
-    UnaryCommand,
     describe,
     parse,
 )
@@ -81,7 +81,12 @@ class MessageProcessor:
                 self._tell(
                     ReportKind.MESSAGE, f"{source}:{destination}> {text.strip()}", self.line, 0
                 )
-            case _ if isinstance(command, UnaryCommand):
+            case ShowVelocity():
+                # It prints on the terminal alone (spec, "Two ports"); the network hears nothing.
+                self._tell(
+                    ReportKind.IGNORED, "a query is answered on the terminal only", self.line, 0
+                )
+            case _ if isinstance(command, Obeyed):
                 self._commands.execute(command, now)
             case _:
                 text = f"not obeyed by this version: {describe(command)}"

@@ -65,9 +65,10 @@ class SacNode:
                 pull_out=settings.pull_out_curve,
             ),
             self._engine,
-            self._tell_ops if memory.soft_ops else None,
             self._tell_of_command,
         )
+        if memory.soft_ops:
+            self._commands.tell_ops(self._tell_ops)
         self._network = NetworkPort(
             memory.d_id, self._settings, self._rate, self._network_line, self._tell
         )

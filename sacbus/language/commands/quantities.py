@@ -1,6 +1,7 @@
 """How speeds, accelerations and "no number" are said in a command.
 
-Owns ``BARE``, and the printing of a velocity and of hundredths in the manual's shortest form.
+Owns ``BARE``, and the printing of a velocity and of hundredths: in the manual's shortest form, and
+as its screens show them.
 Source: manual, "Accel", "V".
 """
 
@@ -9,7 +10,15 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-__all__ = ["BARE", "NO_RAMP", "Bare", "hundredths_text", "ramp_text", "velocity_text"]
+__all__ = [
+    "BARE",
+    "NO_RAMP",
+    "Bare",
+    "fixed_text",
+    "hundredths_text",
+    "ramp_text",
+    "velocity_text",
+]
 
 NO_RAMP: Final = 99900
 """Acceleration 999 in hundredths: no ramp at all (manual, "Accel")."""
@@ -29,6 +38,11 @@ def hundredths_text(value100: int) -> str:
     whole, hundredths = divmod(value100, 100)
     fraction = f".{hundredths:02}".rstrip("0").rstrip(".")
     return f"{whole or ''}{fraction}"
+
+
+def fixed_text(value100: int) -> str:
+    """``1.00``, ``10.47``, ``999.00``: as the screens of a terminal have it."""
+    return f"{value100 // 100}.{value100 % 100:02}"
 
 
 def ramp_text(letter: str, value100: int | Bare | None) -> str:

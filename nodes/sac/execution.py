@@ -1,0 +1,334 @@
+"""The command in execution: loaded, held at sync, started, cut short, ended.
+
+Owns the one command that an engine runs, or will run next: its load time, sync, start wait, GAP and
+the velocity that is kept for the next one, and the telling of its start and end. Which command that
+is, and what follows it, is the command processor's business. Time is an argument, in ns.
+Source: manual, "GAP", "sync", "T/t start wait", "ops/soft_ops"; spec, motion.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Protocol
+
+from nodes.sac.engine import Engine
+from nodes.sac.order import Source
+from sacbus.kernel import Ns
+from sacbus.language import Defaults, Motion, Move
+from sacbus.motion import (
+    TICKS_PER_US,
+    Drive,
+    Profile,
+    Rpm,
+    Timebase,
+    gap_passes,
+    load_ticks,
+    plan,
+)
+from sacbus.node import ReportKind
+
+__all__ = ["Execution", "Ops", "TellOfCommand", "shortest"]
+
+
+class Ops(Protocol):
+    """Takes the start and the end of each command, at the instant of either."""
+
+    def __call__(self, *, start: bool, at: Ns) -> Ns:
+        """Tell of it; until when the node is busy with that."""
+        ...
+
+
+class TellOfCommand(Protocol):
+    """Takes what is worth a report."""
+
+    def __call__(self, kind: ReportKind, text: str, command: str | None = None, /) -> None:
+        """``command`` is what it is about; None: the line that has just come."""
+        ...
+
+
+class Execution:
+    """The command on an engine.
+
+    ``defaults`` are what its text is shortened by. ``tell`` takes what is worth a report.
+    """
+
+    __slots__ = (
+        "_drive",
+        "_engine",
+        "_free",
+        "_held_at",
+        "_held_loaded",
+        "_kept_rpm",
+        "_last",
+        "_last_end",
+        "_last_period",
+        "_ops",
+        "_tell",
+        "_untold",
+        "current",
+        "defaults",
+        "due",
+        "gap",
+        "held",
+        "source",
+        "stopping",
+    )
+
+    def __init__(
+        self, drive: Drive, engine: Engine, defaults: Defaults, tell: TellOfCommand
+    ) -> None:
+        self._drive = drive
+        self._engine = engine
+        self.defaults = defaults
+        self._tell = tell
+        self._ops: Ops | None = None
+        #: Whether somebody has yet to be told of the start.
+        self._untold = False
+        #: The command that runs or waits for its start, and the one that is held at sync.
+        self.current: Motion | None = None
+        self.held: Motion | None = None
+        self._held_loaded: Ns = 0
+        #: Where either comes from, and the queue position of the held one if it has one.
+        self.source = Source.STANDBY
+        self._held_at: int | None = None
+        #: Whether what runs is on its way to a stop: then nothing of its velocity is kept.
+        self.stopping = False
+        #: Whether a velocity is kept only through a gap that is short (G toggles it).
+        self.gap = True
+        #: When the node is free to load: now, or when it has told of the last end.
+        self._free: Ns = 0
+        self._kept_rpm: Rpm = 0
+        self._last_end: Ns = 0
+        self._last_period = 0
+        #: The command that was loaded last.
+        self._last: Motion | None = None
+        #: When the command that runs is over, or its start is to be told; None: never.
+        self.due: Ns | None = None
+
+    @property
+    def idle(self) -> bool:
+        """Whether no command runs, waits or is held."""
+        return self.current is None and self.held is None
+
+    @property
+    def profile(self) -> Profile | None:
+        """That of the command that runs or waits for its start."""
+        return self._engine.profile
+
+    def tell_ops(self, ops: Ops | None) -> None:
+        """Have the starts and ends of commands told, or not; a start that was told has its end."""
+        self._ops = ops
+        if ops is None:
+            self._untold = False
+
+    def reboot(self, drive: Drive, defaults: Defaults, now: Ns) -> None:
+        """Go on with other parameters, at rest. Nothing may run or be held."""
+        self._drive = drive
+        self.defaults = defaults
+        self.gap = True
+        self.forget_velocity()
+        self._last = None
+        self._free = max(self._free, now)
+
+    def set_clock(self, clock: Timebase, now: Ns) -> None:
+        """Pulses are timed by another clock from ``now`` on."""
+        self._engine.set_clock(clock, now)
+
+    def see_what_is_due(self) -> None:
+        """Work out :attr:`due` anew; after anything that may have changed it."""
+        self.due = self._engine.started if self._untold else self._engine.end
+
+    # ---- to the start ----
+
+    def load(self, motion: Motion, source: Source, position: int | None, now: Ns) -> None:
+        """Load a command while idle; it starts when it is ready, or is held if it says so.
+
+        ``position`` is where it stands in the queue.
+        """
+        load = self._engine.processing(load_ticks(_changes_acceleration(self._last, motion)))
+        self._last = motion
+        self.source = source
+        loaded = max(now, self._free) + load
+        if motion.sync:
+            self.held = motion
+            self._held_at = position
+            self._held_loaded = loaded
+        else:
+            self._launch(motion, loaded, was_waiting=now <= self._last_end)
+
+    def release(self, now: Ns) -> None:
+        """Let the held command start. Not remembered when nothing is held."""
+        held = self.held
+        if held is not None:
+            self.held = None
+            # It was loaded while it was held: nodes that one broadcast releases start together.
+            self._launch(held, max(now, self._held_loaded), was_waiting=False)
+
+    def drop_held(self) -> int | None:
+        """Hold nothing any more; the queue position of what was held, if it has one."""
+        if self.held is None:
+            return None
+        self.held = None
+        self.source = Source.STANDBY
+        return self._held_at
+
+    def _launch(self, motion: Motion, ready: Ns, *, was_waiting: bool) -> None:
+        """Plan a command that may start at ``ready``, and start it after its start wait.
+
+        Seamless when it may start within one more period of the last one's end: then it keeps the
+        velocity, and if it was waiting at that end, loading adds no time. Else it starts at slow,
+        unless GAP testing is off: then the velocity stays as it was left.
+        """
+        engine = self._engine
+        wait = motion.wait_us * TICKS_PER_US
+        kept = self._kept_rpm
+        if kept:
+            late = engine.clock.ticks_in(ready - self._last_end) + wait
+            if engine.clock.runs and gap_passes(late, self._last_period):
+                if was_waiting and not wait and self._free <= self._last_end:
+                    ready = self._last_end
+            elif self.gap:
+                kept = 0
+        profile = plan(motion, self._drive, kept)
+        self.current = motion
+        engine.start(profile, ready, wait)
+        self.warn(profile)
+        if not engine.clock.runs:
+            self._tell(
+                ReportKind.WARNING,
+                "external clock: no edges come, so nothing moves before they do",
+                shortest(motion, self.defaults),
+            )
+        self._untold = self._ops is not None
+
+    def warn(self, profile: Profile) -> None:
+        """Report what a profile asks of the hardware that it cannot give."""
+        for warning in profile.warnings:
+            self._tell(ReportKind.WARNING, str(warning), shortest(profile.motion, self.defaults))
+
+    # ---- on the way ----
+
+    def cut(self, now: Ns) -> None:
+        """End what runs with its present pulse, keeping its velocity."""
+        if self.current is None:
+            return
+        if not self._engine.begun(now):
+            self._drop_unstarted()
+        else:
+            self._engine.change(lambda profile, at: profile.cut(at), now)
+
+    def slow_down(self, dec100: int, *, linear: bool, now: Ns) -> None:
+        """End what runs by a deceleration (hundredths) from where it is."""
+        if self.current is None:
+            return
+        if not self._engine.begun(now):
+            self._drop_unstarted()
+        else:
+            self._engine.change(
+                lambda profile, at: profile.slow_down(at, dec100, linear=linear), now
+            )
+
+    def halt(self, now: Ns) -> None:
+        """End what runs at once: no pulse more."""
+        if self.current is None:
+            return
+        if not self._engine.begun(now):
+            self._drop_unstarted()
+            return
+        self.stopping = True
+        self._engine.change(lambda profile, at: profile.halt(at), now)
+        self._finish(now)
+
+    def retarget(self, motion: Motion, now: Ns) -> None:
+        """Put other parameters in the place of those of the continuous motion that runs."""
+        profile = self._engine.profile
+        if profile is None:
+            return
+        self.current = motion
+        if not self._engine.begun(now):
+            self._engine.replace(plan(motion, self._drive, profile.start_rpm))
+        else:
+            self._engine.change(lambda profile, at: profile.retarget(at, motion), now)
+        if self._engine.profile is not None:
+            self.warn(self._engine.profile)
+
+    def forget_velocity(self) -> None:
+        """Whatever comes next begins from rest."""
+        self._kept_rpm = 0
+
+    def _drop_unstarted(self) -> None:
+        """The command's first pulse has not come: it never will."""
+        self._engine.discard()
+        self.current = None
+        self.source = Source.STANDBY
+        self._untold = False
+
+    # ---- to the end ----
+
+    def wake(self, now: Ns) -> Ns | None:
+        """Tell of a start that is due; end the command that is over: when it was, else None."""
+        engine = self._engine
+        if self._untold and engine.begun(now):
+            self._tell_start()
+        end = engine.end
+        if end is None or end > now:
+            return None
+        self._finish(end)
+        return end
+
+    def _finish(self, end: Ns) -> None:
+        """House-keeping in STOP: the present command ends at ``end``."""
+        profile = self._engine.profile
+        if profile is None:
+            return
+        kept = self._kept_rpm = 0 if self.stopping else profile.kept_rpm
+        if kept:
+            self._last_end = end
+            self._last_period = profile.last_period
+        self.stopping = False
+        self.current = None
+        self.source = Source.STANDBY
+        self._engine.finish(end)
+        if self._ops is not None:
+            if self._untold:
+                self._tell_start()
+            self._free = self._ops(start=False, at=end)
+            if self._free > end and self.gap:
+                # The packet outlasts the gap (manual, "ops/soft_ops").
+                self._kept_rpm = 0
+
+    def _tell_start(self) -> None:
+        self._untold = False
+        at = self._engine.started
+        if self._ops is not None and at is not None:
+            self._ops(start=True, at=at)
+
+
+def _changes_acceleration(last: Motion | None, motion: Motion) -> bool:
+    return (
+        last is None
+        or motion.acc100 != last.acc100
+        or motion.dec100 != last.dec100
+        or motion.linear != last.linear
+    )
+
+
+@lru_cache(maxsize=1_024)
+def shortest(motion: Motion, defaults: Defaults) -> str:
+    """A resolved command in the manual's shortest form, with all that shapes its profile.
+
+    Its velocity in RPM where that gives this very cycle, as ``v100`` gives 3000 us.
+    """
+    rpm = motion.rpm
+    by_rpm = rpm > 0 and defaults.cycle_of(rpm) == motion.cycle_us
+    return Move(
+        steps=motion.steps,
+        opposite=not motion.cw,
+        rpm=rpm if by_rpm else None,
+        cycle_us=None if by_rpm else motion.cycle_us,
+        acc100=motion.acc100,
+        dec100=motion.dec100,
+        linear=motion.linear or None,
+        extra_pulses=motion.extra_pulses or None,
+        pulses=motion.pulses or None,
+    ).text()
