@@ -21,6 +21,7 @@ from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
 from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, verbose
 from sacbus.cli.plan import plan_command
+from sacbus.cli.queue import queue_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
 from sacbus.cli.terminal import terminal_command
@@ -55,6 +56,7 @@ for command in (
     terminal_command,
     monitor_command,
     plan_command,
+    queue_command,
     check_command,
     kinds_command,
 ):
