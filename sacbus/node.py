@@ -1,10 +1,10 @@
 """The contract between the bus and a kind of node, and the registry of kinds.
 
 Owns the shapes in which the two meet: what a node hears (:class:`Heard`), what it can be asked
-(:class:`Node`), what it tells out of band (:class:`Report`), what a wire protocol must answer
-(:class:`Protocol`), and how kinds are found: through entry points of the group ``sacbus.nodes``,
-the project's own no differently from a third party's. Time is always an argument, in ns of bus
-time. Nothing here knows a particular protocol or kind.
+(:class:`Node`), its :class:`Terminal`, what it tells out of band (:class:`Report`), what a wire
+protocol must answer (:class:`Protocol`), and how kinds are found: through entry points of the group
+``sacbus.nodes``, the project's own no differently from a third party's. Time is always an argument,
+in ns of bus time. Nothing here knows a particular protocol or kind.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ class Terminal(Contract):
     show: Callable[[bytes], None] | None
 
     def type(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive. The owner asks the bus to touch the node afterwards (Bus.touch)."""
+        """Keys arrive. The owner asks the bus to touch the node afterwards (``Bus.touch``)."""
         ...
 
 
@@ -160,6 +160,11 @@ class Node(Contract):
     @property
     def receiving(self) -> bool:
         """True while its receiver stands open: bytes that are not for it may still matter to it."""
+        ...
+
+    @property
+    def terminal(self) -> Terminal | None:
+        """Its terminal port, made when it is first asked for; None for kinds without one."""
         ...
 
     def hear(self, heard: Heard, now: Ns) -> None:
@@ -186,11 +191,6 @@ class Node(Contract):
 
     def snapshot(self, now: Ns) -> Snapshot:
         """What can be seen of it at ``now``; changes nothing."""
-        ...
-
-    @property
-    def terminal(self) -> Terminal | None:
-        """Its terminal port, made when first asked for; None for kinds without."""
         ...
 
     def persist(self) -> Mapping[str, int]:

@@ -1,29 +1,58 @@
 """The message processor: takes a line apart and sends each part where it belongs.
 
-Owns what a line from the network is: a command, a message for the terminal, something to be sent
-on, or nothing that a SAC knows. Motion goes to the command processor. SAC checks nothing and says
+Owns what a line from either port is: a command, a message for the terminal, something to be sent
+on, or nothing that a SAC knows; and what a mode of the terminal makes of it. Motion goes to the
+command processor, what is to be shown to the terminal, whoever asked. SAC checks nothing and says
 nothing; what a line did not achieve is reported out of band.
-Source: manual, "Communications"; spec, "Two ports, two manners".
+
+Decisions where the manual is silent: what is sent on is printed as ``85> m3000``, as the author's
+packet firmware does, whichever port it came from; text that is typed without an address goes
+nowhere; in debug mode the timing is printed after typed commands that are loaded into the queue.
+Source: manual, "Communications", "Queue", "xRef"; spec, "Two ports, two manners".
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
+from nodes.sac import screens
 from nodes.sac.command import CommandProcessor, Obeyed
+from nodes.sac.queries import Query
+from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import Ns
 from sacbus.language import (
+    Command,
+    Configure,
+    Edit,
+    EditQueue,
     Empty,
     Forward,
+    Leave,
+    MapPins,
     Message,
+    Mode,
     Move,
     Parsed,
-    ShowVelocity,
+    ProgramQueue,
+    ProgramReferences,
+    RestoreQueue,
+    SaveQueue,
+    SetParameter,
+    SetReference,
+    ShowConfiguration,
+    ShowMemory,
+    ShowQueue,
+    ShowReferences,
     SoftOp,
+    Stop,
+    SystemCommand,
+    ThrowAway,
     describe,
     parse,
+    parse_in,
 )
+from sacbus.motion import TICKS_PER_US, load_ticks
 from sacbus.node import ReportKind
 from sacbus.wire import GENERAL_CALL
 
@@ -32,23 +61,42 @@ __all__ = ["MessageProcessor"]
 
 _SPACE: Final = 0x20
 
+_OpensMode = ProgramQueue | ProgramReferences | Configure
+_System = SystemCommand | SaveQueue | RestoreQueue
+"""What works on the EEPROM, or on what it was read into."""
+_OfBothPorts = Obeyed | Query | _System | Forward | Empty | SoftOp | Leave
+_Entry = EditQueue | SetReference | SetParameter | MapPins
+"""What is entered in a mode; the mode's screen is shown again after it."""
+
+_SCREENS: Final[Mapping[Mode, Query]] = {
+    Mode.QUEUE: ShowQueue(),
+    Mode.REFERENCES: ShowReferences(),
+    Mode.CONFIGURE: ShowConfiguration(),
+}
+"""What a mode shows when it is entered, and after every entry."""
+
 
 class MessageProcessor:
-    """Lines in. ``send(dest, body, not_before)`` sends a line on; ``tell`` takes reports."""
+    """Lines in. ``send(dest, body, not_before)`` sends a line on; ``tell`` takes reports.
 
-    __slots__ = ("_commands", "_last_source", "_line", "_send", "_tell")
+    ``terminal`` is None until somebody has asked for the port.
+    """
+
+    __slots__ = ("_commands", "_line", "_send", "_tell", "last_source", "terminal")
 
     def __init__(
         self,
         commands: CommandProcessor,
         send: Callable[[int, bytes, Ns], Ns],
         tell: Callable[[ReportKind, str, str, int], None],
+        terminal: TerminalPort | None = None,
     ) -> None:
         self._commands = commands
         self._send = send
         self._tell = tell
+        self.terminal = terminal
         #: Who sent the last packet that was not a general call; ``/`` answers there.
-        self._last_source = GENERAL_CALL
+        self.last_source = GENERAL_CALL
         self._line = b""
 
     @property
@@ -60,7 +108,7 @@ class MessageProcessor:
         """The body of a packet that was accepted at ``now``."""
         self._line = body
         if destination != GENERAL_CALL:
-            self._last_source = source
+            self.last_source = source
         parsed = parse(body)
         command = parsed.command
         if parsed.remarks:
@@ -69,28 +117,98 @@ class MessageProcessor:
             self._tell_of_rest(body)
         if type(command) is Move:  # nearly all are, and this is much quicker than a match
             self._commands.execute(command, now)
+        elif isinstance(command, Message):
+            self._show_message(f"{source}:{destination}> {command.body.strip()}")
+        elif isinstance(command, _OpensMode):
+            self._ignored(f"{command.text()} opens a screen: that is the terminal's business alone")
+        elif command is not None:
+            self._obey(command, now)
+
+    def terminal_line(self, line: bytes, terminal: TerminalPort, now: Ns) -> None:
+        """A line that was typed in whatever mode the terminal is in, without its end."""
+        self._line = line
+        mode = terminal.mode
+        parsed = parse_in(mode, line)
+        command = parsed.command
+        if parsed.remarks:
+            self._tell_remarks(parsed)
+        if b" " in line and line[0] != _SPACE:
+            self._tell_of_rest(line)
+        if command is None:
             return
+        if isinstance(command, Message):
+            self._ignored("text without an address goes nowhere: put a node's number before it")
+        elif isinstance(command, _OpensMode):
+            if isinstance(command, Configure):
+                self._end_all_motion(now)
+            terminal.mode = Mode(command.text())
+            terminal.answer(_SCREENS[terminal.mode])
+        elif isinstance(command, Leave):
+            terminal.mode = Mode.PROMPT
+        else:
+            self._obey(command, now)
+            if mode in _SCREENS and isinstance(command, _Entry):
+                terminal.answer(_SCREENS[mode])
+            if self._commands.debug:
+                self._print_timing(command, terminal)
+
+    def _obey(self, command: _OfBothPorts, now: Ns) -> None:
+        """Do what a line says that means the same on both ports."""
+        if isinstance(command, Empty | SoftOp | Leave):
+            pass
+        elif isinstance(command, Forward):
+            self._send_on(command, now)
+        elif isinstance(command, Query):
+            if isinstance(command, ShowMemory):
+                self._end_all_motion(now)
+            self._answer(command)
+        elif isinstance(command, _System):
+            text = f"not obeyed by this version: {describe(command)}"
+            self._tell(ReportKind.REFUSED, text, self.line, 1)
+        else:
+            self._commands.execute(command, now)
+
+    def _end_all_motion(self, now: Ns) -> None:
+        """What every system command begins with (manual, "System Commands")."""
+        self._commands.execute(Stop(grace=False), now)
+
+    def _send_on(self, forward: Forward, now: Ns) -> None:
+        to = self.last_source if forward.destination is None else forward.destination
+        self._send(to, forward.rest.encode("latin-1"), now)
+        if self.terminal is not None:
+            self.terminal.print((f"{to}> {forward.rest}",))
+
+    def _show_message(self, text: str) -> None:
+        self._tell(ReportKind.MESSAGE, text, self.line, 0)
+        if self.terminal is not None:
+            self.terminal.print((text,))
+
+    def _answer(self, query: Query) -> None:
+        """It prints on the terminal alone (spec, "Two ports"); the network hears nothing."""
+        terminal = self.terminal
+        if terminal is None or terminal.show is None:
+            self._ignored("a query is answered on the terminal only, and nobody is there")
+        else:
+            terminal.answer(query)
+
+    def _print_timing(self, command: Command, terminal: TerminalPort) -> None:
+        """What was loaded into the queue, and whether its ramps were named, decide on the time."""
+        loaded: Move | Edit
         match command:
-            case None | Empty() | SoftOp():
-                pass
-            case Forward(onward, rest):
-                self._send(
-                    self._last_source if onward is None else onward, rest.encode("latin-1"), now
-                )
-            case Message(text):
-                self._tell(
-                    ReportKind.MESSAGE, f"{source}:{destination}> {text.strip()}", self.line, 0
-                )
-            case ShowVelocity():
-                # It prints on the terminal alone (spec, "Two ports"); the network hears nothing.
-                self._tell(
-                    ReportKind.IGNORED, "a query is answered on the terminal only", self.line, 0
-                )
-            case _ if isinstance(command, Obeyed):
-                self._commands.execute(command, now)
+            case Move():
+                loaded = command
+            case ThrowAway(move):
+                loaded = move
+            case EditQueue(_, edit):
+                loaded = edit
             case _:
-                text = f"not obeyed by this version: {describe(command)}"
-                self._tell(ReportKind.REFUSED, text, self.line, 1)
+                return
+        ramps = (loaded.acc100, loaded.dec100, loaded.linear)
+        load = load_ticks(ramps != (None, None, None)) // TICKS_PER_US
+        terminal.print(screens.timing(len(self._line) + 1, load))
+
+    def _ignored(self, text: str) -> None:
+        self._tell(ReportKind.IGNORED, text, self.line, 0)
 
     def _tell_remarks(self, parsed: Parsed) -> None:
         kind = ReportKind.REFUSED if parsed.command is None else ReportKind.WARNING

@@ -13,7 +13,10 @@ from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
+from nodes.sac.queries import Query, answer
+from nodes.sac.screens import Flags
 from nodes.sac.settings import SacSettings
+from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import LineRate, Ns
 from sacbus.language import Session
 from sacbus.motion import Timebase
@@ -38,6 +41,7 @@ class SacNode:
         "_rate",
         "_settings",
         "_tell_bus",
+        "_terminal",
         "_xclk_hz",
     )
 
@@ -48,6 +52,7 @@ class SacNode:
         self._rate = rate
         self._tell_bus = tell
         self._now: Ns = 0
+        self._terminal: TerminalPort | None = None
         #: Frequency of the clock at the xclk pin.
         self._xclk_hz = settings.xclk_hz
         self._boot(settings.factory_memory(address))
@@ -74,7 +79,9 @@ class SacNode:
         )
         self._network.ack = bool(memory.ack)
         self._network.crc = bool(memory.crc)
-        self._messages = MessageProcessor(self._commands, self._network.send, self._tell_line)
+        self._messages = MessageProcessor(
+            self._commands, self._network.send, self._tell_line, self._terminal
+        )
 
     @property
     def address(self) -> int:
@@ -147,6 +154,40 @@ class SacNode:
                 f"EEPROM: d_id {restored.d_id} is stored and wins over the configured {configured}",
             )
         self._boot(restored)
+
+    # ---- the terminal ----
+
+    @property
+    def terminal(self) -> TerminalPort:
+        """Its terminal port, made when it is first asked for: most nodes never have a user."""
+        if self._terminal is None:
+            self._terminal = self._messages.terminal = TerminalPort(self)
+        return self._terminal
+
+    def keys_typed(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive at the terminal port."""
+        self._now = now
+        self.terminal.take(keys, now)
+
+    def line_typed(self, line: bytes, now: Ns) -> None:
+        """A line was typed at the terminal port."""
+        self._messages.terminal_line(line, self.terminal, now)
+
+    def answer(self, query: Query) -> list[str]:
+        """What a query shows on the terminal."""
+        commands, network = self._commands, self._network
+        flags = Flags(
+            gap=commands.gap,
+            debug=commands.debug,
+            throttle=False,  # after a boot; no command of this version changes it
+            soft_ops=bool(self._memory.soft_ops),
+            ack=network.ack,
+            crc=network.crc,
+            source=self._messages.last_source,
+        )
+        return answer(query, commands, self._memory, flags)
+
+    # ---- pins ----
 
     def feed_xclk(self, hz: int, now: Ns) -> None:
         """From ``now`` on a clock of ``hz`` comes to the xclk pin; 0: no edges.

@@ -124,13 +124,14 @@ def velocity(defaults: Session) -> list[str]:
     return [f"{defaults.rpm} RPM  cycle {defaults.cycle_us}"]
 
 
-def timing(characters: int, baud: int, load_us: int) -> list[str]:
+def timing(characters: int, load_us: int) -> list[str]:
     """What debug prints after a command: how long it took to come and to be loaded, in us.
 
-    characters: of the line, its end included, 10 bits each. It is the time "taken to receive the
-    serial input, parse the data and load it into the command buffer" (manual, introduction).
+    characters: of the line, its end included, 10 bits each at the factory's baud rate. It is the
+    time "taken to receive the serial input, parse the data and load it into the command buffer"
+    (manual, introduction).
     """
-    return [f"{characters * 10_000_000 // baud + load_us} us"]
+    return [f"{characters * 10_000_000 // Parameter.HW.factory + load_us} us"]
 
 
 # --- xRef --------------------------------------------------------------------------------------

@@ -1,0 +1,147 @@
+"""The terminal port of a SAC: keys in, text out; a dumb terminal, no packets.
+
+Owns the line that is being typed, its echo, the prompt, and which mode the terminal is in. What a
+line means is the message processor's business, what a screen shows that of ``queries.py``. Any byte
+may come in any chunks; what comes out, and what is done, is the same however they are cut.
+
+Decisions where the manual is silent. CR, LF, and CR LF end a line and are echoed as CR LF. A line
+has at most 39 characters, as many as the author's packet firmware takes: what comes beyond is not
+echoed, and the line's end is answered ``2big.``. Backspace and DEL take the last character back.
+Every other byte is a character of the line. ``+`` and ``-`` act at once at the prompt only. The
+prompt is ``SAC>`` in every mode, so that a program knows when a screen is over (the manual's
+picture of the configure screen ends with it). What comes from the network, a message or a screen,
+stands on lines of its own; the prompt follows with what was typed so far.
+Source: manual, "Communications", "Queue", "Configure"; spec, "Two ports, two manners".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Final, Protocol
+
+from nodes.sac.queries import Query
+from sacbus.kernel import Ns
+from sacbus.language import Mode
+
+__all__ = ["MAX_TYPED", "PROMPT", "TerminalOwner", "TerminalPort"]
+
+PROMPT: Final = b"SAC>"
+
+#: Characters of a line, an address included; the 40th is too many (recorded from the firmware).
+MAX_TYPED: Final = 39
+
+_END: Final = b"\r\n"
+_CR: Final = 0x0D
+_LF: Final = 0x0A
+_TAKES_BACK: Final = b"\x08\x7f"
+_SIGNS: Final = b"+-"
+
+
+class TerminalOwner(Protocol):
+    """The node behind the port."""
+
+    def keys_typed(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive; usually it hands them to :meth:`TerminalPort.take`."""
+        ...
+
+    def line_typed(self, line: bytes, now: Ns) -> None:
+        """A line is whole, without its end; a single ``+`` or ``-`` as soon as it is typed."""
+        ...
+
+    def answer(self, query: Query) -> list[str]:
+        """What a query shows, line by line."""
+        ...
+
+
+class TerminalPort:
+    """A node's terminal, in the shape of ``sacbus.node.Terminal``."""
+
+    __slots__ = ("_after_cr", "_executing", "_line", "_out", "_owner", "_too_long", "mode", "show")
+
+    def __init__(self, owner: TerminalOwner) -> None:
+        self._owner = owner
+        #: Takes what the port prints, at once; None while nobody is connected: then it is lost.
+        self.show: Callable[[bytes], None] | None = None
+        #: What a line may be.
+        self.mode = Mode.PROMPT
+        self._line = bytearray()
+        self._too_long = False
+        #: Whether the last key was a CR: an LF behind it belongs to the same end.
+        self._after_cr = False
+        #: Whether a typed line is being executed: what it prints stands below it.
+        self._executing = False
+        #: What is to be shown when the keys at hand have been taken; None: nothing is taken now.
+        self._out: bytearray | None = None
+
+    def type(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive. The owner asks the bus to touch the node afterwards (``Bus.touch``)."""
+        self._owner.keys_typed(keys, now)
+
+    def take(self, keys: bytes, now: Ns) -> None:
+        """Take keys as a booted node does."""
+        self._out = out = bytearray()
+        for key in keys:
+            self._take(key, now)
+        self._out = None
+        self._put(out)
+
+    def _take(self, key: int, now: Ns) -> None:
+        if key == _LF and self._after_cr:
+            self._after_cr = False
+            return
+        self._after_cr = key == _CR
+        if key in (_CR, _LF):
+            self._end_line(now)
+        elif key in _TAKES_BACK:
+            if self._line and not self._too_long:
+                del self._line[-1]
+                self._put(b"\b \b")
+        elif key in _SIGNS and not self._line and self.mode is Mode.PROMPT:
+            self._put(bytes((key,)))
+            self._execute(bytes((key,)), now)
+        elif len(self._line) < MAX_TYPED:
+            self._line.append(key)
+            self._put(bytes((key,)))
+        else:
+            self._too_long = True
+
+    def _end_line(self, now: Ns) -> None:
+        self._put(_END)
+        line = bytes(self._line)
+        self._line.clear()
+        if self._too_long:
+            self._too_long = False
+            self._put(b"2big." + _END)
+        else:
+            self._execute(line, now)
+        self._put(PROMPT)
+
+    def _execute(self, line: bytes, now: Ns) -> None:
+        self._executing = True
+        self._owner.line_typed(line, now)
+        self._executing = False
+
+    def answer(self, query: Query) -> None:
+        """Print what a query shows."""
+        self.print(self._owner.answer(query))
+
+    def print(self, lines: Iterable[str]) -> None:
+        """Print lines of text, one byte a character (Latin-1)."""
+        text = b"".join(line.encode("latin-1") + _END for line in lines)
+        if not self._executing:
+            text = _END + text + PROMPT + self._line
+        self._put(text)
+
+    def restart(self) -> None:
+        """After a boot: what was being typed is dropped, any mode is left, the prompt is shown."""
+        self._line.clear()
+        self._too_long = False
+        self.mode = Mode.PROMPT
+        if not self._executing:  # otherwise the prompt follows anyway
+            self._put(_END + PROMPT)
+
+    def _put(self, data: bytes | bytearray) -> None:
+        if self._out is not None:
+            self._out += data
+        elif self.show is not None and data:
+            self.show(bytes(data))
