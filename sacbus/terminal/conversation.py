@@ -61,9 +61,9 @@ def converse(link: str, baud: int, *, history: bool) -> None:
         except EOFError:
             screen.end()
         except KeyboardInterrupt:
-            screen.end()
             if not lost.is_set():
                 raise
+            screen.end()
             dialog.ask("")  # says what has become of the line
 
 

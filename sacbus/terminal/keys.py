@@ -54,14 +54,18 @@ async def type_keys(link: str, baud: int) -> None:
     async with open_line(link, baud) as line:
         line.start(lambda data: _write(screen, data), lambda why: end(ConnectionError(why)))
         with _raw(keyboard):
+            _write(screen, f"{link}: every key is sent at once; Ctrl-D ends it\r\n".encode())
             loop.add_reader(keyboard, pressed)
             try:
                 await ended
             except _Interrupted:
-                raise KeyboardInterrupt from None
+                raise KeyboardInterrupt from None  # whose message begins on a new line
+            except ConnectionError:
+                _write(screen, b"\r\n")
+                raise
             finally:
                 loop.remove_reader(keyboard)
-                _write(screen, b"\r\n")
+            _write(screen, b"\r\n")
 
 
 class _Interrupted(Exception):
@@ -77,7 +81,7 @@ def _write(screen: int, data: bytes) -> None:
 def _raw(keyboard: int) -> Iterator[None]:
     """The keyboard gives every key as it is, Ctrl-C too; put back afterwards."""
     before = termios.tcgetattr(keyboard)
-    tty.setraw(keyboard)
+    tty.setraw(keyboard, termios.TCSADRAIN)  # and keep what has been typed already
     try:
         yield
     finally:

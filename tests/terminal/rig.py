@@ -18,8 +18,15 @@ from typing import Final
 
 __all__ = ["PROMPT", "Device", "Person", "device", "person"]
 
-PATIENCE: Final = 8.0
+PATIENCE: Final = 30.0
 PROMPT: Final = b"SAC>"
+
+#: ``python -m sacbus``, with its standard input as the terminal that interrupts it at Ctrl-C.
+ON_ITS_TERMINAL: Final = """
+import fcntl, runpy, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+runpy.run_module("sacbus", run_name="__main__", alter_sys=True)
+"""
 
 
 class Device(threading.Thread):
@@ -142,7 +149,7 @@ def person(*arguments: str, **environment: str) -> Iterator[Person]:
     """``python -m sacbus ARGUMENTS`` with keyboard and screen on a terminal."""
     master, slave = os.openpty()
     process = subprocess.Popen(
-        [sys.executable, "-m", "sacbus", *arguments],
+        [sys.executable, "-c", ON_ITS_TERMINAL, *arguments],
         stdin=slave,
         stdout=slave,
         stderr=subprocess.PIPE,

@@ -110,7 +110,7 @@ def test_control_c_leaves_with_its_status(tmp_path: Path) -> None:
         prompted(who, 1)
         who.types(CONTROL_C)
         assert who.leaves() == 130
-        assert who.errors() == "interrupted\n"
+        assert who.errors() == "\ninterrupted\n"
 
 
 def test_a_port_that_goes_away_ends_it_with_one_line(tmp_path: Path) -> None:

@@ -8,19 +8,23 @@ import pytest
 
 from sacbus.cli import run
 from tests.serving import until
-from tests.terminal.rig import device, person
+from tests.terminal.rig import Person, device, person
 
 pytestmark = pytest.mark.slow
 
 
+def begins(who: Person) -> None:
+    who.sees(lambda seen: seen.endswith("Ctrl-D ends it\r\n"))
+
+
 def test_keys_arrive_as_they_are_typed_and_what_is_shown_is_the_devices_own() -> None:
     with device() as port, person("terminal", "--raw", port.path) as who:
-        # The first echo says that the keyboard is raw by now: the terminal's own would be "^M".
+        begins(who)
         who.types("+")
-        who.sees(lambda seen: "+" in seen)
+        who.sees(lambda seen: seen.endswith("\n+"))
         assert port.heard == []
         who.types("m4\r")
-        who.sees(lambda seen: seen.endswith("m4\r\nSAC>"))
+        who.sees(lambda seen: seen.endswith("\n+m4\r\nSAC>"))
         until(lambda: port.heard == [b"+m4"])
         who.types("x\x04never sent")
         assert who.leaves() == 0
@@ -30,17 +34,15 @@ def test_keys_arrive_as_they_are_typed_and_what_is_shown_is_the_devices_own() ->
 
 def test_control_c_leaves_with_its_status() -> None:
     with device() as port, person("terminal", "--raw", port.path) as who:
-        who.types("+")
-        who.sees(lambda seen: "+" in seen)
+        begins(who)
         who.types("m\x03")
         assert who.leaves() == 130
-        assert who.errors() == "interrupted\n"
+        assert who.errors() == "\ninterrupted\n"
 
 
 def test_a_port_that_goes_away_ends_it_with_one_line() -> None:
     with device() as port, person("terminal", "--raw", port.path) as who:
-        who.types("+")
-        who.sees(lambda seen: "+" in seen)
+        begins(who)
         port.unplug()
         assert who.leaves() == 1
         assert re.fullmatch(rf"error: the line is gone \(.*\), {port.path}, .*\n", who.errors())
