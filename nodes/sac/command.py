@@ -17,10 +17,10 @@ from dataclasses import replace
 from typing import assert_never
 
 from nodes.sac.engine import Engine
-from nodes.sac.execution import Execution, Ops, TellOfCommand, shortest
+from nodes.sac.execution import Execution, Told, shortest
 from nodes.sac.loop import Loop
 from nodes.sac.order import RULES, Cue, LoopFate, Present, Source
-from nodes.sac.queue import CONTINUOUS_POSITION, THROW_AWAY_POSITION, Queue
+from nodes.sac.queue import Queue
 from sacbus.kernel import Ns
 from sacbus.language import (
     QUEUE_LENGTH,
@@ -84,7 +84,7 @@ Obeyed = (
 
 
 class CommandProcessor:
-    """Executes commands on an engine. ``tell`` takes what is worth a report."""
+    """Executes commands on an engine. ``told`` takes what is worth a report."""
 
     __slots__ = (
         "_barred",
@@ -93,20 +93,20 @@ class CommandProcessor:
         "_preempting",
         "_preempting_source",
         "_run",
-        "_tell",
+        "_told",
         "debug",
         "queue",
         "session",
     )
 
-    def __init__(self, session: Session, drive: Drive, engine: Engine, tell: TellOfCommand) -> None:
+    def __init__(self, session: Session, drive: Drive, engine: Engine, told: Told) -> None:
         self.session = session
         self.queue = Queue(session.defaults)
         #: Whether debug mode is on (B toggles it).
         self.debug = False
-        self._run = Execution(drive, engine, session.defaults, tell)
+        self._run = Execution(drive, engine, session.defaults, told)
         self._engine = engine
-        self._tell = tell
+        self._told = told
         #: Made when it is first asked for: most nodes never loop.
         self._loop: Loop | None = None
         #: What begins as soon as what it cuts has ended: continuous motion, or an X.
@@ -174,9 +174,9 @@ class CommandProcessor:
         self._run.set_clock(clock, now)
         self._run.see_what_is_due()
 
-    def tell_ops(self, ops: Ops | None) -> None:
-        """Have the starts and ends of commands told; None: no longer."""
-        self._run.tell_ops(ops)
+    def switch_ops(self, *, on: bool) -> None:
+        """Have the starts and ends of commands told, or no longer."""
+        self._run.switch_ops(on=on)
         self._run.see_what_is_due()
 
     def bar(self, *, barred: bool, now: Ns) -> None:
@@ -298,12 +298,12 @@ class CommandProcessor:
         """M: the next queue position, or continuous motion at once."""
         motion, self.session = self.session.resolve(move)
         if motion.steps is None:
-            self.queue.keep_hidden(CONTINUOUS_POSITION, motion)
+            self.queue.continuous = motion
             self._go_before(motion, Source.CONTINUOUS, now)
             return
         lost = self.queue.add(motion)
         if lost is not None:
-            self._tell(
+            self._told.tell_of_command(
                 ReportKind.OVERRUN, f"31 commands pending: queue position {lost} overwritten"
             )
         if self._run.idle:
@@ -313,10 +313,10 @@ class CommandProcessor:
         """XM: at once, and the session stays as it was."""
         motion, _ = self.session.resolve(move)
         if motion.steps is None:
-            self.queue.keep_hidden(CONTINUOUS_POSITION, motion)
+            self.queue.continuous = motion
             self._go_before(motion, Source.CONTINUOUS, now)
         else:
-            self.queue.keep_hidden(THROW_AWAY_POSITION, motion)
+            self.queue.throw_away = motion
             self._go_before(motion, Source.ONCE, now)
 
     def _go_before(self, motion: Motion, source: Source, now: Ns) -> None:
@@ -338,7 +338,7 @@ class CommandProcessor:
         if source is Source.LOOP:
             self._looping().again()
         elif source is Source.QUEUE and position is not None and not self.queue.put_back(position):
-            self._tell(
+            self._told.tell_of_command(
                 ReportKind.OVERRUN,
                 f"{shortest(held, self.session.defaults)} was held, and is overwritten",
             )
@@ -349,7 +349,9 @@ class CommandProcessor:
             return
         if self._barred:
             if self._preempting is not None or self.looping or self.queue.pending:
-                self._tell(ReportKind.WARNING, "e-stop is low: nothing starts until it is high")
+                self._told.tell_of_command(
+                    ReportKind.WARNING, "e-stop is low: nothing starts until it is high"
+                )
             return
         motion = self._preempting
         if motion is not None:
@@ -474,4 +476,4 @@ class CommandProcessor:
         return self._loop
 
     def _ignored(self, text: str) -> None:
-        self._tell(ReportKind.IGNORED, text)
+        self._told.tell_of_command(ReportKind.IGNORED, text)

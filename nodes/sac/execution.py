@@ -27,29 +27,25 @@ from sacbus.motion import (
 )
 from sacbus.node import ReportKind
 
-__all__ = ["Execution", "Ops", "TellOfCommand", "shortest"]
+__all__ = ["Execution", "Told", "shortest"]
 
 
-class Ops(Protocol):
-    """Takes the start and the end of each command, at the instant of either."""
+class Told(Protocol):
+    """Who is told what becomes of commands: one object for both, since nodes are many."""
 
-    def __call__(self, *, start: bool, at: Ns) -> Ns:
-        """Tell of it; until when the node is busy with that."""
+    def tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
+        """Something worth a report; ``command`` is what it is about, None: the line just come."""
         ...
 
-
-class TellOfCommand(Protocol):
-    """Takes what is worth a report."""
-
-    def __call__(self, kind: ReportKind, text: str, command: str | None = None, /) -> None:
-        """``command`` is what it is about; None: the line that has just come."""
+    def tell_ops(self, *, start: bool, at: Ns) -> Ns:
+        """A command starts or ends at this instant; until when the node is busy telling of it."""
         ...
 
 
 class Execution:
     """The command on an engine.
 
-    ``defaults`` are what its text is shortened by. ``tell`` takes what is worth a report.
+    ``defaults`` are what its text is shortened by.
     """
 
     __slots__ = (
@@ -62,8 +58,8 @@ class Execution:
         "_last",
         "_last_end",
         "_last_period",
-        "_ops",
-        "_tell",
+        "_tells_ops",
+        "_told",
         "_untold",
         "current",
         "defaults",
@@ -74,14 +70,13 @@ class Execution:
         "stopping",
     )
 
-    def __init__(
-        self, drive: Drive, engine: Engine, defaults: Defaults, tell: TellOfCommand
-    ) -> None:
+    def __init__(self, drive: Drive, engine: Engine, defaults: Defaults, told: Told) -> None:
         self._drive = drive
         self._engine = engine
         self.defaults = defaults
-        self._tell = tell
-        self._ops: Ops | None = None
+        self._told = told
+        #: Whether starts and ends are told of.
+        self._tells_ops = False
         #: Whether somebody has yet to be told of the start.
         self._untold = False
         #: The command that runs or waits for its start, and the one that is held at sync.
@@ -115,10 +110,10 @@ class Execution:
         """That of the command that runs or waits for its start."""
         return self._engine.profile
 
-    def tell_ops(self, ops: Ops | None) -> None:
-        """Have the starts and ends of commands told, or not; a start that was told has its end."""
-        self._ops = ops
-        if ops is None:
+    def switch_ops(self, *, on: bool) -> None:
+        """Have the starts and ends of commands told, or no longer."""
+        self._tells_ops = on
+        if not on:
             self._untold = False
 
     def reboot(self, drive: Drive, defaults: Defaults, now: Ns) -> None:
@@ -194,17 +189,19 @@ class Execution:
         engine.start(profile, ready, wait)
         self.warn(profile)
         if not engine.clock.runs:
-            self._tell(
+            self._told.tell_of_command(
                 ReportKind.WARNING,
                 "external clock: no edges come, so nothing moves before they do",
                 shortest(motion, self.defaults),
             )
-        self._untold = self._ops is not None
+        self._untold = self._tells_ops
 
     def warn(self, profile: Profile) -> None:
         """Report what a profile asks of the hardware that it cannot give."""
         for warning in profile.warnings:
-            self._tell(ReportKind.WARNING, str(warning), shortest(profile.motion, self.defaults))
+            self._told.tell_of_command(
+                ReportKind.WARNING, str(warning), shortest(profile.motion, self.defaults)
+            )
 
     # ---- on the way ----
 
@@ -289,10 +286,10 @@ class Execution:
         self.current = None
         self.source = Source.STANDBY
         self._engine.finish(end)
-        if self._ops is not None:
+        if self._tells_ops:
             if self._untold:
                 self._tell_start()
-            self._free = self._ops(start=False, at=end)
+            self._free = self._told.tell_ops(start=False, at=end)
             if self._free > end and self.gap:
                 # The packet outlasts the gap (manual, "ops/soft_ops").
                 self._kept_rpm = 0
@@ -300,8 +297,8 @@ class Execution:
     def _tell_start(self) -> None:
         self._untold = False
         at = self._engine.started
-        if self._ops is not None and at is not None:
-            self._ops(start=True, at=at)
+        if at is not None:
+            self._told.tell_ops(start=True, at=at)
 
 
 def _changes_acceleration(last: Motion | None, motion: Motion) -> bool:

@@ -70,10 +70,9 @@ class SacNode:
                 pull_out=settings.pull_out_curve,
             ),
             self._engine,
-            self._tell_of_command,
+            self,
         )
-        if memory.soft_ops:
-            self._commands.tell_ops(self._tell_ops)
+        self._commands.switch_ops(on=bool(memory.soft_ops))
         self._network = NetworkPort(
             memory.d_id, self._settings, self._rate, self._network_line, self._tell
         )
@@ -209,14 +208,14 @@ class SacNode:
     def _network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         self._messages.network_line(body, source, destination, now)
 
-    def _tell_ops(self, *, start: bool, at: Ns) -> Ns:
+    def tell_ops(self, *, start: bool, at: Ns) -> Ns:
         """Soft ops tell everybody that a command starts or ends; when that will be out."""
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
     def _tell(self, kind: ReportKind, text: str) -> None:
         self._tell_line(kind, text, "", 0)
 
-    def _tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
+    def tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
         """About a command that runs later than it came, or else about the line that has come."""
         self._tell_line(kind, text, self._messages.line if command is None else command, 0)
 

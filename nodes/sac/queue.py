@@ -5,7 +5,7 @@ processor's business. Positions count from 1 and go round. The manual's two hidd
 well: 0 keeps the last continuous motion and 31 the last throw-away, for who looks at the queue in
 debug mode; nothing else reads them.
 
-A node whose queue nobody has written to keeps none: every position is then the seeded row.
+Positions that nobody has written are not kept: they are the seeded row.
 Source: manual, "Command buffer", "Queue", "Throw-away"; spec, "Queue".
 """
 
@@ -30,11 +30,15 @@ _seeded = lru_cache(maxsize=256)(seeded_row)
 class Queue:
     """The positions and their order. ``defaults`` fill the positions that nobody has written."""
 
-    __slots__ = ("_defaults", "_rows", "_undo", "next_free", "pending")
+    __slots__ = ("_defaults", "_rows", "_undo", "continuous", "next_free", "pending", "throw_away")
 
     def __init__(self, defaults: Defaults) -> None:
         self._defaults = defaults
-        self._rows: list[Motion] | None = None
+        #: From position 1 as far as anybody has written.
+        self._rows: list[Motion] = []
+        #: What stands in the hidden positions; None as long as nothing has been put there.
+        self.continuous: Motion | None = None
+        self.throw_away: Motion | None = None
         #: The position written last, what stood there before, and whether it waits since then.
         self._undo: tuple[int, Motion, bool] | None = None
         #: Where the next command goes: "Q is at N".
@@ -45,7 +49,13 @@ class Queue:
 
     def row(self, position: int) -> Motion:
         """What stands in a position, 0 to 31."""
-        return _seeded(self._defaults) if self._rows is None else self._rows[position]
+        if position == CONTINUOUS_POSITION:
+            row = self.continuous
+        elif position == THROW_AWAY_POSITION:
+            row = self.throw_away
+        else:
+            row = self._rows[position - 1] if position <= len(self._rows) else None
+        return _seeded(self._defaults) if row is None else row
 
     def rows(self) -> tuple[Motion, ...]:
         """Positions 1 to 30."""
@@ -71,10 +81,6 @@ class Queue:
     def write(self, position: int, motion: Motion) -> None:
         """Put a command into a position, 1 to 30; what waits, and in which order, stays."""
         self._write(position, motion, waits=False)
-
-    def keep_hidden(self, position: int, motion: Motion) -> None:
-        """Remember a command in a hidden position, for who looks there."""
-        self._own_rows()[position] = motion
 
     def put_back(self, position: int) -> bool:
         """Let a command that was taken from the head wait again; False when it was overwritten.
@@ -104,18 +110,14 @@ class Queue:
 
     def load(self, rows: Sequence[Motion]) -> None:
         """Replace all 30 positions; nothing waits afterwards, and the next free one is 1."""
-        own = self._own_rows()
-        own[1 : QUEUE_LENGTH + 1] = rows
+        self._rows = list(rows)
         self._undo = None
         self.pending.clear()
         self.next_free = 1
 
     def _write(self, position: int, motion: Motion, *, waits: bool) -> None:
-        rows = self._own_rows()
-        self._undo = (position, rows[position], waits)
-        rows[position] = motion
-
-    def _own_rows(self) -> list[Motion]:
-        if self._rows is None:
-            self._rows = [_seeded(self._defaults)] * (QUEUE_LENGTH + 2)
-        return self._rows
+        rows = self._rows
+        while len(rows) < position:
+            rows.append(_seeded(self._defaults))
+        self._undo = (position, rows[position - 1], waits)
+        rows[position - 1] = motion

@@ -56,7 +56,17 @@ class TerminalOwner(Protocol):
 class TerminalPort:
     """A node's terminal, in the shape of ``sacbus.node.Terminal``."""
 
-    __slots__ = ("_after_cr", "_executing", "_line", "_out", "_owner", "_too_long", "mode", "show")
+    __slots__ = (
+        "_after_cr",
+        "_at_line_start",
+        "_executing",
+        "_line",
+        "_out",
+        "_owner",
+        "_too_long",
+        "mode",
+        "show",
+    )
 
     def __init__(self, owner: TerminalOwner) -> None:
         self._owner = owner
@@ -68,6 +78,7 @@ class TerminalPort:
         self._too_long = False
         #: Whether the last key was a CR: an LF behind it belongs to the same end.
         self._after_cr = False
+        self._at_line_start = True
         #: Whether a typed line is being executed: what it prints stands below it.
         self._executing = False
         #: What is to be shown when the keys at hand have been taken; None: nothing is taken now.
@@ -125,11 +136,17 @@ class TerminalPort:
         """Print what a query shows."""
         self.print(self._owner.answer(query))
 
+    def boot(self, version: str) -> None:
+        """A cold boot begins: its line is printed, and no prompt before it is over."""
+        self._begin_line()
+        self._put(version.encode("ascii") + _END)
+
     def print(self, lines: Iterable[str]) -> None:
         """Print lines of text, one byte a character (Latin-1)."""
         text = b"".join(line.encode("latin-1") + _END for line in lines)
         if not self._executing:
-            text = _END + text + PROMPT + self._line
+            self._begin_line()
+            text += PROMPT + self._line
         self._put(text)
 
     def restart(self) -> None:
@@ -138,9 +155,16 @@ class TerminalPort:
         self._too_long = False
         self.mode = Mode.PROMPT
         if not self._executing:  # otherwise the prompt follows anyway
-            self._put(_END + PROMPT)
+            self._begin_line()
+            self._put(PROMPT)
+
+    def _begin_line(self) -> None:
+        if not self._at_line_start:
+            self._put(_END)
 
     def _put(self, data: bytes | bytearray) -> None:
+        if data:
+            self._at_line_start = data.endswith(_END)
         if self._out is not None:
             self._out += data
         elif self.show is not None and data:

@@ -101,6 +101,45 @@ def test_nothing_and_padding_and_soft_ops_are_nothing_to_report(line: str) -> No
     assert bench.told() == []
 
 
+# ---- queries, and what belongs to the terminal ---------------------------------------------------
+
+
+@pytest.mark.parametrize("line", ["q", "xd", "cc", "cf", "vd", "$E"])
+def test_a_query_that_nobody_can_see_the_answer_of_is_told_as_ignored(line: str) -> None:
+    bench = Bench()
+    bench.hears(line, at=AT)
+    bench.run()
+    assert bench.answers == [ACKED]
+    assert reports(bench) == [("ignored", packet_line(line), 0)]
+
+
+@pytest.mark.parametrize("line", ["qp", "XP", "$C"])
+def test_a_screen_is_not_opened_from_the_network(line: str) -> None:
+    bench = Bench()
+    shown = bytearray()
+    bench.node.terminal.show = shown.extend
+    bench.hears("m", at=AT)
+    bench.hears(line, at=AT + SECOND)
+    bench.hears("x5", at=AT + 2 * SECOND)
+    bench.run()
+    # The motor went on, and x5 was no line of a mode.
+    assert bench.answers == [ACKED] * 3
+    assert reports(bench) == [("ignored", packet_line(line), 0)]
+    assert bench.position(bench.kernel.now) > 200
+    assert shown == b""
+
+
+@pytest.mark.parametrize(("line", "state"), [("$E", "STANDBY"), ("q", "CRUISE")])
+def test_a_system_command_that_shows_something_ends_all_motion(line: str, state: str) -> None:
+    bench = Bench()
+    shown = bytearray()
+    bench.node.terminal.show = shown.extend
+    bench.hears("m", at=AT)
+    bench.hears(line, at=AT + SECOND)
+    assert bench.snapshot(AT + SECOND).state == state
+    assert shown.endswith(b"\r\nSAC>")
+
+
 # ---- messages -----------------------------------------------------------------------------------
 
 
@@ -157,6 +196,15 @@ def test_a_line_with_an_address_is_sent_on_as_a_packet_of_the_nodes_own(
     bench.run()
     assert bench.answers == [ack(7, NODE), packet(rest, to, NODE)]
     assert bench.position(SECOND) == 0
+
+
+def test_what_is_sent_on_is_printed_as_the_recorded_device_does() -> None:
+    bench = Bench()
+    shown = bytearray()
+    bench.node.terminal.show = shown.extend
+    bench.sends(packet("85hi", NODE, 7), at=AT)
+    bench.run()
+    assert shown == b"85> hi\r\nSAC>"
 
 
 @pytest.mark.parametrize("line", [" 85m200", "-85m200"])
