@@ -17,7 +17,7 @@ from sacbus.host import Host
 from sacbus.links import Link
 from sacbus.node import Node, Terminal
 
-__all__ = ["KEPT", "Console"]
+__all__ = ["KEPT", "WAITING", "Console"]
 
 #: Characters shown and not read that a console keeps; older ones are lost, as from a screen.
 KEPT: Final = 65_536

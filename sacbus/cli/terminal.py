@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import sys
 
 import click
@@ -32,6 +33,8 @@ def terminal_command(link: str, baud: int, raw: bool, no_history: bool) -> int:
     """
     from sacbus.terminal.dialog import NoAnswer
 
+    if sys.stdin is None:  # closed before we were started (`<&-`)
+        raise click.UsageError("standard input is closed, give a terminal, a file or a pipe")
     try:
         if raw:
             _type_keys(link, baud)
@@ -42,9 +45,11 @@ def terminal_command(link: str, baud: int, raw: bool, no_history: bool) -> int:
         else:
             from sacbus.terminal.lines import WrongLine, type_lines
 
+            # What is no ASCII is refused with its place, whatever it would be decoded to.
+            lines = io.TextIOWrapper(sys.stdin.buffer, encoding="latin-1")
             try:
-                type_lines(link, baud, sys.stdin)
-            except (WrongLine, UnicodeDecodeError) as fault:
+                type_lines(link, baud, lines)
+            except WrongLine as fault:
                 raise WrongInput(str(fault)) from fault
     except NoAnswer as fault:
         click.echo(f"error: {fault}", err=True)

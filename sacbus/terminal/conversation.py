@@ -20,6 +20,7 @@ from typing import Final
 from platformdirs import user_state_path
 
 from sacbus.terminal.background import Background
+from sacbus.terminal.dialog import Untypable
 
 try:
     import readline
@@ -57,7 +58,10 @@ def converse(link: str, baud: int, *, history: bool) -> None:
             while True:
                 with screen.edited() as prompt:
                     line = input(prompt)
-                dialog.ask(line)
+                try:
+                    dialog.ask(line)
+                except Untypable as fault:
+                    screen.show(f"{fault}\n{prompt}")
         except EOFError:
             screen.end()
         except KeyboardInterrupt:

@@ -19,7 +19,7 @@ from typing import Final
 from sacbus.links import Line, LinkError
 from sacbus.terminal.echo import LineEcho
 
-__all__ = ["PROMPT", "Dialog", "NoAnswer"]
+__all__ = ["PROMPT", "Dialog", "NoAnswer", "Untypable"]
 
 #: What a SAC shows when it waits for a line (manual, "Terminal").
 PROMPT: Final = "SAC>"
@@ -50,6 +50,16 @@ class NoAnswer(LinkError, TimeoutError):
             where,
             "check that it is a terminal port and not the network's, and the baud rate",
         )
+
+
+class Untypable(ValueError):
+    """A line that no keyboard of a terminal types. column: from 1; got: the character there."""
+
+    def __init__(self, column: int, got: str) -> None:
+        super().__init__(
+            f"this cannot be typed, column {column}, expected printable ASCII, got {got!r}"
+        )
+        self.column, self.got = column, got
 
 
 class Dialog:
@@ -93,9 +103,12 @@ class Dialog:
     async def ask(self, line: str) -> str:
         """Send a line and CR; what is shown upon it, the prompt included.
 
-        ValueError for what is no text of a terminal, :class:`NoAnswer` for silence.
+        :class:`Untypable` if nothing was sent, :class:`NoAnswer` for silence.
         """
-        data = line.encode("latin-1")
+        for column, one in enumerate(line, start=1):
+            if not (one.isascii() and one.isprintable()):
+                raise Untypable(column, one)
+        data = line.encode("ascii")
         self._echo = LineEcho(data)
         self._heard, self._text = b"", ""
         self._line.send(data + b"\r")

@@ -11,13 +11,19 @@ from collections.abc import Iterable
 import click
 
 from sacbus.terminal.background import Background
-from sacbus.terminal.dialog import PROMPT
+from sacbus.terminal.dialog import PROMPT, Untypable
 
 __all__ = ["WrongLine", "type_lines"]
 
 
 class WrongLine(ValueError):
-    """A line that cannot be typed: which, what was expected, what came."""
+    """A line that cannot be typed: where, what was expected, what came."""
+
+    def __init__(self, number: int, fault: Untypable) -> None:
+        super().__init__(
+            f"this cannot be typed, standard input line {number} column {fault.column}, "
+            f"expected printable ASCII, got {fault.got!r}"
+        )
 
 
 def type_lines(link: str, baud: int, lines: Iterable[str]) -> None:
@@ -29,18 +35,12 @@ def type_lines(link: str, baud: int, lines: Iterable[str]) -> None:
         dialog.begin()
         for number, line in enumerate(lines, start=1):
             text = line.rstrip("\r\n")
-            if text.strip():
-                _check(number, text)
+            if not text.strip():
+                continue
+            try:
                 _print(dialog.ask(text))
-
-
-def _check(number: int, line: str) -> None:
-    for column, one in enumerate(line, start=1):
-        if not (one.isascii() and one.isprintable()):
-            raise WrongLine(
-                f"line {number} cannot be typed, standard input line {number} column {column}, "
-                f"expected printable ASCII, got {one!r}"
-            )
+            except Untypable as fault:
+                raise WrongLine(number, fault) from fault
 
 
 def _print(shown: str) -> None:

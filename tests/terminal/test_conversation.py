@@ -57,6 +57,19 @@ def test_a_line_can_be_edited_and_an_earlier_one_fetched_back(tmp_path: Path) ->
         assert who.leaves() == 0
 
 
+def test_what_no_terminal_can_type_is_told_and_not_sent(tmp_path: Path) -> None:
+    with device() as port, person("terminal", port.path, HOME=str(tmp_path)) as who:
+        prompted(who, 1)
+        who.types("m4\u20ac\r")
+        who.sees(lambda seen: "this cannot be typed, column 3, expected printable ASCII" in seen)
+        prompted(who, 2)
+        who.types("m4\r")
+        heard(port, b"", b"m4")
+        prompted(who, 3)
+        who.types(CONTROL_D)
+        assert who.leaves() == 0
+
+
 def test_what_was_typed_is_kept_for_the_next_time_unless_that_is_refused(tmp_path: Path) -> None:
     def comes_back(*options: str) -> bytes:
         with (
@@ -131,5 +144,7 @@ def test_where_nobody_answers_that_is_told_in_one_line(tmp_path: Path) -> None:
     ):
         assert who.leaves() == 4
         error = who.errors()
-        assert error.startswith(f"error: no answer within 3 s, expected the prompt SAC>, {port.path}")
+        assert error.startswith(
+            f"error: no answer within 3 s, expected the prompt SAC>, {port.path}"
+        )
         assert error.count("\n") == 1

@@ -76,7 +76,7 @@ def test_a_line_that_is_gone_is_told_in_words() -> None:
                 while b"q" not in port.heard:  # noqa: ASYNC110 (its thread has no event of ours)
                     await asyncio.sleep(0.001)
             port.unplug()
-            with pytest.raises(ConnectionError, match="the line is gone .*, open it again"):
+            with pytest.raises(ConnectionError, match=r"the line is gone .*, open it again"):
                 await asking
             with pytest.raises(ConnectionError, match="the line is gone"):
                 await dialog.ask("q")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +15,7 @@ def stripped(line: bytes, shown: bytes, *cuts: int) -> bytes:
     """What is left of ``shown``, that comes in pieces, once nothing more comes."""
     echo = LineEcho(line)
     places = [0, *sorted(cuts), len(shown)]
-    pieces = [shown[one:next_] for one, next_ in zip(places, places[1:], strict=False)]
+    pieces = [shown[one:next_] for one, next_ in pairwise(places)]
     left = b"".join(echo.strip(piece) for piece in pieces if piece)
     return left + (b"" if echo.over else echo.settle())
 

@@ -46,7 +46,7 @@ def test_what_no_key_types_is_told_with_its_place(wrong: str | bytes) -> None:
         status, _, error = piped(port.path, wrong)
         assert status == 2
         assert error.startswith(
-            "error: line 2 cannot be typed, standard input line 2 column 4, expected printable"
+            "error: this cannot be typed, standard input line 2 column 4, expected printable ASCII"
         )
         assert error.count("\n") == 1
         assert port.heard == [b"", b"q"]
@@ -65,3 +65,12 @@ def test_a_link_that_cannot_be_had_is_told() -> None:
     assert status == 1
     assert error.startswith("error: cannot open the line (no such file), /nonexistent, check")
     assert error.count("\n") == 1
+
+
+def test_without_standard_input_there_is_nobody_to_talk() -> None:
+    with device() as port:
+        command = f"exec {sys.executable} -m sacbus terminal {port.path} <&-"
+        ran = subprocess.run(["sh", "-c", command], capture_output=True, timeout=PATIENCE)
+        assert ran.returncode == 2
+        assert ran.stderr.startswith(b"error: standard input is closed, give a terminal")
+        assert port.heard == []

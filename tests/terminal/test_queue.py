@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from sacbus.cli import run
 from sacbus.language.queue_file import read_rows
 from sacbus.language.queue_screen import QueueScreen
-from tests.terminal.rig import PROMPT, device
+from tests.terminal.rig import PROMPT, Device, device
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +30,7 @@ def screen(lines: list[str]) -> bytes:
 WHOLE = QueueScreen(ROWS, 7).lines()
 
 
-def shows(answer: bytes):  # noqa: ANN201
+def shows(answer: bytes) -> AbstractContextManager[Device]:
     return device(lambda line: answer if line == b"q" else PROMPT)
 
 
@@ -125,6 +126,13 @@ def test_a_file_that_cannot_be_written_is_told(capsys: Captured, tmp_path: Path)
 def test_standard_output_has_room_for_one(capsys: Captured) -> None:
     assert run(["queue", "get", "--json", "/dev/null", "-"]) == 2
     assert "--json and - both want standard output, name a file" in capsys.readouterr().err
+
+
+def test_getting_has_help_with_an_example(capsys: Captured) -> None:
+    assert run(["queue", "get", "--help"]) == 0
+    written = capsys.readouterr().out
+    assert "Example: sacbus queue get " in written
+    assert max(map(len, written.splitlines())) <= 100
 
 
 def test_without_a_command_the_help_is_shown(capsys: Captured) -> None:
