@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import pytest
 
-from sacbus.links import open_line
+from sacbus.links import Line, open_line
 from sacbus.terminal.dialog import Dialog, NoAnswer
 from tests.terminal.rig import PROMPT, Device, device
 
@@ -43,6 +43,21 @@ def test_an_answer_is_as_long_as_it_is() -> None:
     with device(lambda line: (screen if line else b"") + PROMPT) as port:
         _, shown = talk(port, begun)
         assert shown == screen.replace(b"\r", b"").decode() + "SAC>"
+
+
+def test_what_follows_a_prompt_at_once_is_of_the_same_answer() -> None:
+    # As when a key is obeyed at once, and the end of its line a moment later.
+    async def scene() -> None:
+        loop = asyncio.get_running_loop()
+        line = Line("memory")
+        dialog = Dialog(line, "memory")
+        asking = asyncio.create_task(dialog.ask("+"))
+        await asyncio.sleep(0)
+        line.hear(b"+\r\nSAC>")
+        loop.call_later(0.001, line.hear, b"\r\nSAC>")
+        assert await asking == "SAC>\nSAC>"
+
+    asyncio.run(scene())
 
 
 def test_a_prompt_within_an_answer_does_not_end_it() -> None:
