@@ -34,6 +34,7 @@ from sacbus.node import (
     find_kind,
     settings_from,
 )
+from sacbus.saving import AtOnce, Saving, Thread
 from sacbus.state import StateDirectory, StateError
 
 __all__ = ["FASTEST", "SLOWEST", "Configuration", "HostedBus", "NodeAt", "check", "open_bus"]
@@ -276,6 +277,27 @@ class HostedBus:
             for link in (*self.links, *self.terminals.values()):
                 stack.callback(link.close)
 
+    def keep(self, state: StateDirectory) -> Callable[[], None]:
+        """Save a node's memory whenever it changes; a save that fails is reported.
+
+        What is given ends that, once all is written; what has failed is left to :meth:`save`.
+        """
+
+        def failed(address: int, text: str) -> None:
+            self.bus.tell(Report(self.now(), address, ReportKind.WARNING, text))
+
+        virtual = isinstance(self.host, VirtualHost)
+        saving = AtOnce(state, failed) if virtual else Thread(state, failed)
+        for wanted, node in self._configured:
+            node.memory_changed = partial(_save, saving, wanted, node)
+
+        def end() -> None:
+            for _, node in self._configured:
+                node.memory_changed = None
+            saving.close()
+
+        return end
+
     def save(self, state: StateDirectory) -> None:
         """Write every node's memory; StateError for the first that could not be written."""
         failed: StateError | None = None
@@ -337,7 +359,12 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
             # what is killed has left as much as what is ended.
             hosted.save(state)
             stack.callback(hosted.save, state)
+            stack.callback(hosted.keep(state))
         yield hosted
+
+
+def _save(saving: Saving, wanted: NodeAt, node: Node) -> None:
+    saving.save(wanted.address, wanted.kind, node.persist())
 
 
 def _host(configuration: Configuration, bus: Bus, loop: asyncio.AbstractEventLoop) -> Host:

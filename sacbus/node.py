@@ -154,7 +154,7 @@ class Node(Contract):
 
     @property
     def address(self) -> int:
-        """The address it answers to now."""
+        """The address it answers to now; another only after a wake or a touch (``Bus.touch``)."""
         ...
 
     @property
@@ -193,8 +193,11 @@ class Node(Contract):
         """What can be seen of it at ``now``; changes nothing."""
         ...
 
-    def persist(self) -> Mapping[str, int]:
-        """The contents of its EEPROM."""
+    #: Called by the node each time the contents of its EEPROM have changed.
+    memory_changed: Callable[[], None] | None
+
+    def persist(self) -> Mapping[str, object]:
+        """The contents of its EEPROM, as JSON has them. Cheap: it is asked at each change."""
         ...
 
     def restore(self, memory: Mapping[str, object]) -> None:

@@ -12,23 +12,35 @@ import os
 import sys
 import zlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 if sys.platform != "win32":
     import fcntl
 
 from platformdirs import user_state_path
 
-__all__ = ["StateDirectory", "StateError", "default_directory"]
+__all__ = ["StateDirectory", "StateError", "Stored", "default_directory", "read_memory"]
 
 _FORMAT: Final = 1
+
+#: The end of the name of a file that is being written.
+_UNFINISHED: Final = ".new"
 
 _CURE: Final = "choose another directory with --state DIR, or --ephemeral to keep nothing"
 
 
 class StateError(OSError):
     """The state directory cannot be used; the text says what, where and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """What a file holds: the kind of node that wrote it, and its memory by name, JSON values."""
+
+    kind: str
+    memory: dict[str, object]
 
 
 def default_directory() -> Path:
@@ -50,7 +62,7 @@ class StateDirectory:
         """Where the memory of the node configured at ``address`` lies."""
         return self._place / str(address)
 
-    def load(self, address: int, kind: str) -> tuple[dict[str, int] | None, str | None]:
+    def load(self, address: int, kind: str) -> tuple[dict[str, object] | None, str | None]:
         """The stored memory, if there is one that can be trusted, and a remark if there is not.
 
         A damaged file, or one of another kind of node, is renamed to ``ADDRESS.damaged`` (the next
@@ -63,9 +75,11 @@ class StateDirectory:
             return None, None
         except OSError as fault:
             raise self._unusable("read", path, fault) from fault
-        memory, wrong = _decode(content, kind)
-        if memory is not None:
-            return memory, None
+        stored, wrong = _decode(content)
+        if stored is not None:
+            if stored.kind == kind:
+                return stored.memory, None
+            wrong = f"of a node of kind {stored.kind!r}, not {kind!r}"
         aside = _free_name(path)
         try:
             path.rename(aside)
@@ -73,13 +87,13 @@ class StateDirectory:
             raise self._unusable("set aside", path, fault) from fault
         return None, f"EEPROM file {path}: {wrong}; kept as {aside.name}, factory values used"
 
-    def save(self, address: int, kind: str, memory: Mapping[str, int]) -> None:
+    def save(self, address: int, kind: str, memory: Mapping[str, object]) -> None:
         """Write a memory; whatever happens, the file is either the old or the new one."""
         path = self.path(address)
         content = _encode(kind, memory)
         if self._holds(path, content):
             return
-        fresh = path.with_name(f".{path.name}.{os.getpid()}.new")
+        fresh = path.with_name(f".{path.name}.{os.getpid()}{_UNFINISHED}")
         try:
             self._place.mkdir(parents=True, exist_ok=True)
             with fresh.open("wb") as file:
@@ -117,6 +131,15 @@ class StateDirectory:
                 f"the nodes' memory is in use by another sacbus, {self._place}, {_CURE}"
             ) from fault
         self._lock = lock
+        self._clear_away()
+
+    def _clear_away(self) -> None:
+        """Remove what saves left behind that were killed; the directory is ours alone."""
+        for left in self._place.glob(f".*{_UNFINISHED}"):
+            try:
+                left.unlink()
+            except OSError as fault:
+                raise self._unusable("clear away unfinished", left, fault) from fault
 
     def release(self) -> None:
         """Let others have it. Idempotent."""
@@ -140,15 +163,33 @@ class StateDirectory:
         return StateError(f"cannot {what} node memory ({fault.strerror or fault}), {path}, {_CURE}")
 
 
-def _encode(kind: str, memory: Mapping[str, int]) -> bytes:
+def read_memory(path: Path) -> Stored:
+    """What a memory's file holds, wherever it lies; StateError when it cannot be trusted."""
+    try:
+        content = path.read_bytes()
+    except OSError as fault:
+        raise StateError(
+            f"cannot read node memory ({fault.strerror or fault}), {path}, give the file of a "
+            "node: ADDRESS in the directory of its bus"
+        ) from fault
+    stored, wrong = _decode(content)
+    if stored is None:
+        raise StateError(
+            f"this is no node's memory that can be trusted, {path}, {wrong}; a bus that finds it "
+            "keeps it aside and starts the node with factory values"
+        )
+    return stored
+
+
+def _encode(kind: str, memory: Mapping[str, object]) -> bytes:
     body = {"format": _FORMAT, "kind": kind, "memory": dict(memory)}
     return (json.dumps({**body, "check": _check(body)}, indent=1) + "\n").encode()
 
 
-def _decode(content: bytes, kind: str) -> tuple[dict[str, int] | None, str]:
-    """The memory, or None and what is wrong with the file."""
+def _decode(content: bytes) -> tuple[Stored | None, str]:
+    """What is stored, or None and what is wrong with the file."""
     try:
-        stored = json.loads(content)
+        stored: Any = json.loads(content)  # whatever JSON it is
     except (ValueError, RecursionError):
         return None, "not readable as JSON"
     if not isinstance(stored, dict) or not isinstance(stored.get("memory"), dict):
@@ -158,9 +199,7 @@ def _decode(content: bytes, kind: str) -> tuple[dict[str, int] | None, str]:
         return None, f"check value {check!r} does not match the content"
     if stored.get("format") != _FORMAT:
         return None, f"format {stored.get('format')!r}, this version reads {_FORMAT}"
-    if stored.get("kind") != kind:
-        return None, f"of a node of kind {stored.get('kind')!r}, not {kind!r}"
-    return stored["memory"], ""
+    return Stored(str(stored.get("kind")), stored["memory"]), ""
 
 
 def _check(body: Mapping[str, object]) -> int:

@@ -143,6 +143,11 @@ class CommandProcessor:
         return self._run.gap
 
     @property
+    def soft_ops(self) -> bool:
+        """Whether the starts and ends of commands are told."""
+        return self._run.tells_ops
+
+    @property
     def looping(self) -> bool:
         """Whether a loop has commands to come, at once or when what goes before it is over."""
         return self._loop is not None and self._loop.running

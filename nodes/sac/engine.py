@@ -180,6 +180,24 @@ class Engine:
         """Single pulses, out of any profile; only while the motor stands."""
         self._rest = Where(*(position + pulses for position in self._rest))
 
+    def change_microsteps(self, before: int, after: int) -> None:
+        """Count positions in microsteps of 2**-after full steps from now on; the motor stands.
+
+        It stays where it is, to the nearest of them: that is where its driver holds it (decision).
+        """
+        pulses, *places = self._rest
+        if after >= before:
+            places = [place << after - before for place in places]
+        else:
+            half = 1 << before - after - 1
+            places = [(place + half) >> before - after for place in places]
+        self._rest = Where(pulses, *places)
+
+    @property
+    def clockwise(self) -> bool:
+        """The direction of the last profile; clockwise before the first."""
+        return self._sign > 0
+
     def where(self, now: Ns) -> Where:
         """Positions at ``now``."""
         if self._profile is None or not self.begun(now):

@@ -58,7 +58,6 @@ class Execution:
         "_last",
         "_last_end",
         "_last_period",
-        "_tells_ops",
         "_told",
         "_untold",
         "current",
@@ -68,6 +67,7 @@ class Execution:
         "held",
         "source",
         "stopping",
+        "tells_ops",
     )
 
     def __init__(self, drive: Drive, engine: Engine, defaults: Defaults, told: Told) -> None:
@@ -76,7 +76,7 @@ class Execution:
         self.defaults = defaults
         self._told = told
         #: Whether starts and ends are told of.
-        self._tells_ops = False
+        self.tells_ops = False
         #: Whether somebody has yet to be told of the start.
         self._untold = False
         #: The command that runs or waits for its start, and the one that is held at sync.
@@ -112,7 +112,7 @@ class Execution:
 
     def switch_ops(self, *, on: bool) -> None:
         """Have the starts and ends of commands told, or no longer."""
-        self._tells_ops = on
+        self.tells_ops = on
         if not on:
             self._untold = False
 
@@ -194,7 +194,7 @@ class Execution:
                 "external clock: no edges come, so nothing moves before they do",
                 shortest(motion, self.defaults),
             )
-        self._untold = self._tells_ops
+        self._untold = self.tells_ops
 
     def warn(self, profile: Profile) -> None:
         """Report what a profile asks of the hardware that it cannot give."""
@@ -286,7 +286,7 @@ class Execution:
         self.current = None
         self.source = Source.STANDBY
         self._engine.finish(end)
-        if self._tells_ops:
+        if self.tells_ops:
             if self._untold:
                 self._tell_start()
             self._free = self._told.tell_ops(start=False, at=end)

@@ -1,120 +1,161 @@
-"""The EEPROM of a SAC: its persistent parameters.
+"""The EEPROM of a SAC: its persistent parameters, its pin map, and the queue that was saved.
 
-Owns the parameters' names, factory values and widths. The names are those of the configure screen.
-Only the parameters that this version obeys are here; the others follow with the configure commands.
-Source: manual, "Configure" and "EEPROM".
+Owns what is stored, in which form, and what is made of stored values that do not fit. Parameters
+bear the names of ``sacbus.language.Parameter`` in lower case; factory values and limits stand there
+alone. The saved queue is stored as rows of the companion's CSV, so that people can read it.
+
+Two parameters have a factory value of the place where the node is put: ``d_id`` is the configured
+address, and the rate of the port that is on the line is the line's own (decisions).
+Source: manual, "Configure", "EEPROM", "ustep", "Queue".
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final, TypeGuard
 
-from sacbus.language import Defaults
-from sacbus.motion import FACTORY_XFREQ, Drive, PullOut
+from sacbus.language import QUEUE_LENGTH, Defaults, Motion, Parameter
+from sacbus.language.queue_file import QueueRow, WrongRow, read_rows
+from sacbus.motion import Drive, PullOut
 
-__all__ = ["Memory"]
+__all__ = ["BAUD", "PINS", "QUEUE", "Memory", "name_of", "port_on_line"]
 
-_ONE_BIT: Final = 1
-_BYTE: Final = 255
-_WORD: Final = 65_535
-_LONG: Final = 2**32 - 1
-_NO_RAMP: Final = 99_900
+#: The rate of a line at which a SAC as it left the factory is understood.
+BAUD: Final = Parameter.SW.factory
 
-#: The largest value of each parameter; all are whole numbers from 0. Accelerations in hundredths.
-_LARGEST: Final[Mapping[str, int]] = {
-    "ramp": _ONE_BIT,
-    "cw": _ONE_BIT,
-    "dir": _ONE_BIT,
-    "clock": _ONE_BIT,
-    "xfreq": _LONG,
-    "ihd": _BYTE,
-    "xclk": _BYTE,
-    "ustep": 7,
-    "pulse": _BYTE,
-    "slow": _BYTE,
-    "d_id": _BYTE,
-    "sprf": _WORD,
-    "cycle": _LONG,
-    "acc": _NO_RAMP,
-    "dec": _NO_RAMP,
-    "l_acc": _NO_RAMP,
-    "l_dec": _NO_RAMP,
-    "soft_ops": _ONE_BIT,
-    "ack": _ONE_BIT,
-    "crc": _ONE_BIT,
-    "full_step": _ONE_BIT,
-}
+#: The names under which the pin map and the saved queue are stored.
+PINS: Final = "pins"
+QUEUE: Final = "queue"
 
-#: Parameters that nothing can be divided by when they are 0: the device would hang, we take the
-#: factory's value instead (slow: 1) and say so.
-_NOT_ZERO: Final[Mapping[str, int]] = {
-    "sprf": 200,
-    "cycle": 3000,
-    "xfreq": FACTORY_XFREQ,
-    "slow": 1,
-    "acc": _NO_RAMP,
-    "dec": _NO_RAMP,
-    "l_acc": _NO_RAMP,
-    "l_dec": _NO_RAMP,
-}
+#: Levels of MS3 MS2 MS1 as bits 2 to 0, by exponent, for the drivers that have a table of their
+#: own: A4988 and DRV8825 (their data sheets; spec, "System commands").
+_DRIVERS: Final = ((0b000, 0b001, 0b010, 0b011, 0b111), (0b000, 0b001, 0b010, 0b011, 0b100, 0b101))
 
+#: What driver 2 starts with: exponent n at levels n, "represented internally as the exponent"
+#: (manual, "ustep"; decision).
+_OWN_PINS: Final = tuple(range(Parameter.USTEP.largest + 1))
+
+#: What versions before the queue was saved called OVERRIDE, the other way round; never but 1.
+_FORMER: Final = "full_step"
+
+_RATES: Final = (Parameter.HW, Parameter.SW)
 
 #: One for all nodes that are alike: what is worked out for one then serves them all.
 _drive = lru_cache(maxsize=256)(Drive)
 _defaults = lru_cache(maxsize=256)(Defaults)
 
 
+def name_of(parameter: Parameter) -> str:
+    """What a parameter is called in memory, in settings and in the file: ``d_id``."""
+    return parameter.name.lower()
+
+
+_BY_NAME: Final = {name_of(parameter): parameter for parameter in Parameter}
+
+
+def port_on_line(network: int) -> Parameter:
+    """The rate that counts on the line: the software port's, or with ``network`` the hardware's."""
+    return Parameter.HW if network else Parameter.SW
+
+
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """Persistent parameters with the factory's values (``d_id``: 85, as every SAC is born)."""
+    """What an EEPROM holds; as it left the factory (``d_id``: 85, as every SAC is born).
 
-    ramp: int = 0
-    cw: int = 0
-    dir: int = 0
-    clock: int = 1
-    xfreq: int = FACTORY_XFREQ
-    ihd: int = 8
-    xclk: int = 0
-    ustep: int = 0
-    pulse: int = 1
-    slow: int = 10
-    d_id: int = 85
-    sprf: int = 200
-    cycle: int = 3000
-    acc: int = 100
-    dec: int = 100
-    l_acc: int = 1047
-    l_dec: int = 1047
-    soft_ops: int = 0
-    ack: int = 1
-    crc: int = 1
-    full_step: int = 1
+    Flags are 0 or 1, accelerations hundredths, all else as on the configure screen. ``pins``:
+    levels of MS3 MS2 MS1 by exponent, for driver 2. ``queue``: 30 commands, None: never saved.
+    ``line``: what the line runs at that the node is on; it is not stored.
+    """
 
-    def restored(self, stored: Mapping[str, object]) -> tuple[Memory, list[str]]:
-        """This memory with what was stored put in; a sentence for each value not taken as is."""
-        remarks: list[str] = []
-        taken: dict[str, int] = {}
-        for name, value in stored.items():
-            largest = _LARGEST.get(name)
-            if largest is None:
-                remarks.append(f"EEPROM: parameter {name!r} is not known to this version; ignored")
-            elif isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= largest:
-                remarks.append(
-                    f"EEPROM: {name} expected 0 to {largest}, got {value!r}; factory value used"
-                )
-            elif value == 0 and name in _NOT_ZERO:
-                taken[name] = _NOT_ZERO[name]
-                remarks.append(f"EEPROM: {name} is 0, which divides nothing; {taken[name]} used")
-            else:
-                taken[name] = value
-        return replace(self, **taken), remarks
+    autorun: int = Parameter.AUTORUN.factory
+    ramp: int = Parameter.RAMP.factory
+    clock: int = Parameter.CLOCK.factory
+    network: int = Parameter.NETWORK.factory
+    cw: int = Parameter.CW.factory
+    dir: int = Parameter.DIR.factory
+    ihd: int = Parameter.IHD.factory
+    xclk: int = Parameter.XCLK.factory
+    ustep: int = Parameter.USTEP.factory
+    pulse: int = Parameter.PULSE.factory
+    slow: int = Parameter.SLOW.factory
+    d_id: int = Parameter.D_ID.factory
+    r_id: int = Parameter.R_ID.factory
+    sprf: int = Parameter.SPRF.factory
+    cycle: int = Parameter.CYCLE.factory
+    xfreq: int = Parameter.XFREQ.factory
+    acc: int = Parameter.ACC.factory
+    dec: int = Parameter.DEC.factory
+    l_acc: int = Parameter.L_ACC.factory
+    l_dec: int = Parameter.L_DEC.factory
+    ops: int = Parameter.OPS.factory
+    soft_ops: int = Parameter.SOFT_OPS.factory
+    ack: int = Parameter.ACK.factory
+    crc: int = Parameter.CRC.factory
+    hw: int = Parameter.HW.factory
+    sw: int = Parameter.SW.factory
+    override: int = Parameter.OVERRIDE.factory
+    pins: tuple[int, ...] = _OWN_PINS
+    queue: tuple[Motion, ...] | None = None
+    line: int = BAUD
 
-    def stored(self) -> dict[str, int]:
-        """All parameters by name, for the EEPROM's file."""
-        return asdict(self)
+    # ---- single values ----
+
+    def value(self, parameter: Parameter) -> int:
+        """What is stored for a parameter."""
+        value: int = getattr(self, name_of(parameter))
+        return value
+
+    def values(self) -> dict[Parameter, int]:
+        """What is stored for every parameter."""
+        return {parameter: self.value(parameter) for parameter in Parameter}
+
+    def factory(self, parameter: Parameter) -> int:
+        """What a port's rate is before anybody sets it, here; any other's factory value."""
+        return self.line if parameter is port_on_line(self.network) else parameter.factory
+
+    def with_values(self, values: Mapping[Parameter, int]) -> Memory:
+        """With parameters set; each value must be one that its parameter takes.
+
+        When the ports change places, a rate that nobody has set is the new place's.
+        """
+        after = _set(self, values)
+        if after.network == self.network:
+            return after
+        unset = (port for port in _RATES if self.value(port) == self.factory(port))
+        return _set(after, {**{port: after.factory(port) for port in unset}, **values})
+
+    def with_pins(self, exponent: int, levels: int) -> Memory:
+        """With one entry of driver 2's pin map set; both 0 to 7."""
+        pins = list(self.pins)
+        pins[exponent] = levels
+        return replace(self, pins=tuple(pins))
+
+    def with_queue(self, rows: Sequence[Motion]) -> Memory:
+        """With the 30 positions of a queue saved."""
+        return replace(self, queue=tuple(rows))
+
+    # ---- what it means to the node ----
+
+    @property
+    def rate(self) -> int:
+        """Baud of the port that is on the line."""
+        return self.value(port_on_line(self.network))
+
+    @property
+    def clockwise(self) -> bool:
+        """Whether no sign means clockwise: ``dir`` is the level that ``cw`` says is clockwise."""
+        return self.dir == self.cw
+
+    @property
+    def microstep_pins(self) -> int | None:
+        """Levels of MS3 MS2 MS1 (bits 2 to 0) for its microsteps; None: the driver has none such.
+
+        Then the pins stay as they are; pulses are multiplied all the same (decision).
+        """
+        table = (*_DRIVERS, self.pins)[self.r_id]
+        return table[self.ustep] if self.ustep < len(table) else None
 
     def defaults(self) -> Defaults:
         """The system defaults that a session starts from; one object for the same values."""
@@ -126,9 +167,8 @@ class Memory:
             linear_dec100=self.l_dec,
             linear=bool(self.ramp),
             sprf=self.sprf,
-            # cw is the level of the direction pin for clockwise, dir the default direction's.
-            cw=self.dir == self.cw,
-            full_step=bool(self.full_step),
+            cw=self.clockwise,
+            full_step=not self.override,
         )
 
     def drive(
@@ -154,5 +194,104 @@ class Memory:
             pull_out=pull_out,
         )
 
+    # ---- in and out of the file ----
 
-assert {field.name for field in fields(Memory)} == set(_LARGEST)
+    def stored(self) -> dict[str, object]:
+        """All of it by name, JSON values, for the EEPROM's file.
+
+        A port's rate is left out as long as nobody has set it, so that a node may be put on a line
+        of another rate.
+        """
+        memory: dict[str, object] = {
+            name: self.value(parameter)
+            for name, parameter in _BY_NAME.items()
+            if parameter not in _RATES or self.value(parameter) != self.factory(parameter)
+        }
+        memory[PINS] = list(self.pins)
+        if self.queue is not None:
+            memory[QUEUE] = [
+                QueueRow(position, motion).text().strip()
+                for position, motion in enumerate(self.queue, start=1)
+            ]
+        return memory
+
+    def restored(self, stored: Mapping[str, object]) -> tuple[Memory, list[str]]:
+        """This memory with what was stored put in; a sentence for each value not taken as is."""
+        remarks: list[str] = []
+        values: dict[Parameter, int] = {}
+        for name, value in stored.items():
+            parameter = _BY_NAME.get(name)
+            if parameter is not None:
+                taken, remark = _parameter(name, parameter, value)
+                if taken is not None:
+                    values[parameter] = taken
+                if remark is not None:
+                    remarks.append(remark)
+            elif name not in (PINS, QUEUE, _FORMER):
+                remarks.append(f"EEPROM: parameter {name!r} is not known to this version; ignored")
+        memory = self.with_values(values)
+        if PINS in stored:
+            if _is_pin_map(stored[PINS]):
+                memory = replace(memory, pins=tuple(stored[PINS]))
+            else:
+                remarks.append("EEPROM: pins expected 8 levels of 0 to 7; factory values used")
+        if QUEUE in stored:
+            queue, remark = _queue(stored[QUEUE], memory.defaults())
+            memory = replace(memory, queue=queue)
+            if remark is not None:
+                remarks.append(remark)
+        return memory, remarks
+
+
+def _set(memory: Memory, values: Mapping[Parameter, int]) -> Memory:
+    # Any: parameters are whole numbers all; mypy sees names, which might be any field's.
+    fields: dict[str, Any] = {name_of(parameter): value for parameter, value in values.items()}
+    return replace(memory, **fields)
+
+
+def _parameter(name: str, parameter: Parameter, value: object) -> tuple[int | None, str | None]:
+    """A stored value as it is taken, None if it is not, and what is to be said about it."""
+    largest = parameter.largest
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= largest:
+        expected = f"EEPROM: {name} expected 0 to {largest}, got {value!r}"
+        return None, f"{expected}; factory value used"
+    if value == 0 and parameter.zero is not None:
+        zero = parameter.zero
+        return zero, f"EEPROM: {name} is 0, which divides nothing; {zero} used"
+    return value, None
+
+
+def _is_pin_map(stored: object) -> TypeGuard[list[int]]:
+    return (
+        isinstance(stored, list)
+        and len(stored) == len(_OWN_PINS)
+        and all(type(levels) is int and levels in _OWN_PINS for levels in stored)
+    )
+
+
+def _queue(stored: object, defaults: Defaults) -> tuple[tuple[Motion, ...] | None, str | None]:
+    """A saved queue, and what is wrong with one that is not taken."""
+    if not isinstance(stored, list) or not all(isinstance(row, str) for row in stored):
+        return None, "EEPROM: queue expected rows of text; none used"
+    try:
+        read = list(read_rows(stored, "the saved queue", defaults))
+    except WrongRow as fault:
+        return None, f"EEPROM: {fault}; no queue used"
+    if [one.row.position for one in read] != list(range(1, QUEUE_LENGTH + 1)):
+        return None, f"EEPROM: queue expected positions 1 to {QUEUE_LENGTH} in order; none used"
+    told = [(one.row.position, remark) for one in read for remark in one.remarks]
+    queue = tuple(_shared(one.row.motion) for one in read)
+    if not told:
+        return queue, None
+    position, remark = told[0]
+    more = f", and {len(told) - 1} more" if len(told) > 1 else ""
+    return queue, (
+        f"EEPROM: queue position {position} expected {remark.expected}, got {remark.got}; "
+        f"{remark.text}{more}"
+    )
+
+
+@lru_cache(maxsize=256)
+def _shared(motion: Motion) -> Motion:
+    """One object for all positions, of all nodes, that hold the same command."""
+    return motion

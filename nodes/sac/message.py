@@ -13,12 +13,13 @@ Source: manual, "Communications", "Queue", "xRef"; spec, "Two ports, two manners
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from nodes.sac import screens
 from nodes.sac.command import CommandProcessor, Obeyed
 from nodes.sac.queries import Query
+from nodes.sac.system import Board, SystemLine, obey
 from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import Ns
 from sacbus.language import (
@@ -36,8 +37,6 @@ from sacbus.language import (
     Parsed,
     ProgramQueue,
     ProgramReferences,
-    RestoreQueue,
-    SaveQueue,
     SetParameter,
     SetReference,
     ShowConfiguration,
@@ -45,10 +44,7 @@ from sacbus.language import (
     ShowQueue,
     ShowReferences,
     SoftOp,
-    Stop,
-    SystemCommand,
     ThrowAway,
-    describe,
     parse,
     parse_in,
 )
@@ -62,9 +58,7 @@ __all__ = ["MessageProcessor"]
 _SPACE: Final = 0x20
 
 _OpensMode = ProgramQueue | ProgramReferences | Configure
-_System = SystemCommand | SaveQueue | RestoreQueue
-"""What works on the EEPROM, or on what it was read into."""
-_OfBothPorts = Obeyed | Query | _System | Forward | Empty | SoftOp | Leave
+_OfBothPorts = Obeyed | Query | SystemLine | Forward | Empty | SoftOp | Leave
 _Entry = EditQueue | SetReference | SetParameter | MapPins
 """What is entered in a mode; the mode's screen is shown again after it."""
 
@@ -77,23 +71,18 @@ _SCREENS: Final[Mapping[Mode, Query]] = {
 
 
 class MessageProcessor:
-    """Lines in. ``send(dest, body, not_before)`` sends a line on; ``tell`` takes reports.
+    """Lines in. ``terminal`` is None until somebody has asked for the port."""
 
-    ``terminal`` is None until somebody has asked for the port.
-    """
-
-    __slots__ = ("_commands", "_line", "_send", "_tell", "last_source", "terminal")
+    __slots__ = ("_board", "_commands", "_line", "last_source", "terminal")
 
     def __init__(
         self,
         commands: CommandProcessor,
-        send: Callable[[int, bytes, Ns], Ns],
-        tell: Callable[[ReportKind, str, str, int], None],
+        board: Board,
         terminal: TerminalPort | None = None,
     ) -> None:
+        self._board = board
         self._commands = commands
-        self._send = send
-        self._tell = tell
         self.terminal = terminal
         #: Who sent the last packet that was not a general call; ``/`` answers there.
         self.last_source = GENERAL_CALL
@@ -140,7 +129,7 @@ class MessageProcessor:
             self._ignored("text without an address goes nowhere: put a node's number before it")
         elif isinstance(command, _OpensMode):
             if isinstance(command, Configure):
-                self._end_all_motion(now)
+                obey(command, self._board, now)
             terminal.mode = Mode(command.text())
             terminal.answer(_SCREENS[terminal.mode])
         elif isinstance(command, Leave):
@@ -160,26 +149,21 @@ class MessageProcessor:
             self._send_on(command, now)
         elif isinstance(command, Query):
             if isinstance(command, ShowMemory):
-                self._end_all_motion(now)
+                obey(command, self._board, now)
             self._answer(command)
-        elif isinstance(command, _System):
-            text = f"not obeyed by this version: {describe(command)}"
-            self._tell(ReportKind.REFUSED, text, self.line, 1)
+        elif isinstance(command, SystemLine):
+            obey(command, self._board, now)
         else:
             self._commands.execute(command, now)
 
-    def _end_all_motion(self, now: Ns) -> None:
-        """What every system command begins with (manual, "System Commands")."""
-        self._commands.execute(Stop(grace=False), now)
-
     def _send_on(self, forward: Forward, now: Ns) -> None:
         to = self.last_source if forward.destination is None else forward.destination
-        self._send(to, forward.rest.encode("latin-1"), now)
+        self._board.network.send(to, forward.rest.encode("latin-1"), now)
         if self.terminal is not None:
             self.terminal.print((f"{to}> {forward.rest}",))
 
     def _show_message(self, text: str) -> None:
-        self._tell(ReportKind.MESSAGE, text, self.line, 0)
+        self._board.tell(ReportKind.MESSAGE, text, self.line, 0)
         if self.terminal is not None:
             self.terminal.print((text,))
 
@@ -208,19 +192,19 @@ class MessageProcessor:
         terminal.print(screens.timing(len(self._line) + 1, load))
 
     def _ignored(self, text: str) -> None:
-        self._tell(ReportKind.IGNORED, text, self.line, 0)
+        self._board.tell(ReportKind.IGNORED, text, self.line, 0)
 
     def _tell_remarks(self, parsed: Parsed) -> None:
         kind = ReportKind.REFUSED if parsed.command is None else ReportKind.WARNING
         for remark in parsed.remarks:
             text = f"expected {remark.expected}, got {remark.got}: {remark.text}"
-            self._tell(kind, text, self.line, remark.column)
+            self._board.tell(kind, text, self.line, remark.column)
 
     def _tell_of_rest(self, body: bytes) -> None:
         """A space ends a command; who wrote more than padding behind it may not know that."""
         command, _, rest = body.partition(b" ")
         if rest.strip(b" ") and not command[:1].isdigit() and command[:1] not in b"/.":
-            self._tell(
+            self._board.tell(
                 ReportKind.IGNORED,
                 "a space ends a command: what follows it is ignored",
                 self.line,

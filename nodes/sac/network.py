@@ -1,14 +1,15 @@
 """The network port of a SAC: what it hears in packets, when it answers, when it is deaf.
 
 Owns the receiver, the turnaround, the deaf time and the packets that wait to be sent. What a body
-means is the message processor's business. Figures: ``sacbus.wire.times``.
+means is the message processor's business. A port that is set to another rate than the line's hears
+nothing, and nobody understands what it sends. Figures: ``sacbus.wire.times``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+from typing import Final, Protocol
 
+from nodes.sac.memory import Memory, name_of, port_on_line
 from nodes.sac.robust import RobustReceiver
 from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
@@ -28,11 +29,21 @@ from sacbus.wire import (
 )
 from sacbus.wire.times import ANSWER_BYTES, deaf_time, turnaround
 
-__all__ = ["NetworkPort"]
+__all__ = ["NetworkPort", "PortOwner"]
 
 #: For a message of its own the driver is enabled this long before the first bit (measured 5-11 us).
 ENABLE_LEAD: Final[Ns] = 8_000
 
+
+#: Per cent that two rates may differ: a receiver that samples in the middle of the last bit of ten
+#: is wrong beyond 5 %, and half of that is what data sheets leave to each side.
+TOLERANCE: Final = 2.5
+
+#: Deaf until this is deaf for good.
+_FOR_EVER: Final[Ns] = 2**63
+
+#: What arrives of bytes at a wrong rate: always others, and never one that begins or ends a packet.
+_GARBLED: Final = bytes((byte ^ 0x55) | 0x80 for byte in range(256))
 
 #: The device's times by body length: every packet asks for two of them.
 _SIZES: Final = range(MAX_BODY + 1)
@@ -42,26 +53,37 @@ _DEAF_AFTER_ANSWER: Final = [deaf_time(size, answered=True) for size in _SIZES]
 _DEAF_AFTER_BROADCAST: Final = [deaf_time(size, answered=False) for size in _SIZES]
 
 
-class NetworkPort:
-    """Packets in, packets out.
+class PortOwner(Protocol):
+    """The node behind the port."""
 
-    ``accept(body, source, destination, now)`` is given each packet that the device accepts, at the
-    end of its trigger byte (robust receiver: of its last byte).
-    """
+    def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+        """The body of a packet that the device accepts, at the end of its trigger byte.
+
+        With the robust receiver: of its last byte.
+        """
+        ...
+
+    def tell(self, kind: ReportKind, text: str) -> None:
+        """Something worth a report."""
+        ...
+
+
+class NetworkPort:
+    """Packets in, packets out."""
 
     __slots__ = (
-        "_accept",
         "_answer",
         "_answer_at",
         "_answer_span",
         "_deaf",
         "_deaf_until",
+        "_garbles",
         "_outbox",
+        "_owner",
         "_rate",
         "_receiver",
         "_robust",
         "_sent_until",
-        "_tell",
         "_turnaround",
         "_waits_for",
         "ack",
@@ -74,24 +96,17 @@ class NetworkPort:
         "receiving",
     )
 
-    def __init__(
-        self,
-        address: int,
-        settings: SacSettings,
-        rate: LineRate,
-        accept: Callable[[bytes, int, int, Ns], object],
-        tell: Callable[[ReportKind, str], None],
-    ) -> None:
-        self.address = address
+    def __init__(self, settings: SacSettings, rate: LineRate, owner: PortOwner) -> None:
+        """``rate`` is the line's. It is at address 0 until it is :meth:`set_up`."""
+        self.address = GENERAL_CALL
         self._turnaround = settings.turnaround
         self._deaf = settings.deaf_time
         self._rate = rate
         self._answer_span = rate.span(ANSWER_BYTES)
-        self._accept = accept
-        self._tell = tell
+        self._owner = owner
         self._robust = settings.receiver == "robust"
         self._receiver: DeviceReceiver | RobustReceiver = (
-            RobustReceiver(address) if self._robust else DeviceReceiver(address)
+            RobustReceiver(GENERAL_CALL) if self._robust else DeviceReceiver(GENERAL_CALL)
         )
         #: The ACK or NAK that waits, and when its first bit goes out, or would if there were one.
         self._answer: bytes | None = None
@@ -102,6 +117,8 @@ class NetworkPort:
         self._outbox: list[tuple[Ns, bytes]] = []
         self._sent_until: Ns = 0
         self._deaf_until: Ns = 0
+        #: Whether it is set to another rate than the line's.
+        self._garbles = False
         self.ack = True
         self.crc = True
         self.acks = 0
@@ -111,6 +128,36 @@ class NetworkPort:
         self.receiving = self._receiver.open
         #: When something is to be sent next; None when nothing is.
         self.due: Ns | None = None
+
+    def set_up(self, memory: Memory) -> None:
+        """Take address, rate and switches from memory, as at a boot.
+
+        An answer that waits still goes out: it was the answer of the old address.
+        """
+        self.ack = bool(memory.ack)
+        self.crc = bool(memory.crc)
+        self.address = self._receiver.address = memory.d_id
+        baud = self._rate.baud
+        self._garbles = abs(memory.rate - baud) * 100 > TOLERANCE * baud
+        if self._garbles:
+            self._deaf_until = _FOR_EVER
+            self._owner.tell(
+                ReportKind.WARNING,
+                f"{name_of(port_on_line(memory.network))} is {memory.rate} baud, the line runs at "
+                f"{baud}: it hears nothing, and nobody understands it",
+            )
+        elif self._deaf_until == _FOR_EVER:
+            self._deaf_until = 0
+
+    def listen_from(self, moment: Ns | None) -> None:
+        """Hear nothing before ``moment``, None: for good; what was to be sent is forgotten."""
+        self._answer = None
+        self._waits_for = None
+        self._outbox.clear()
+        self.receiving = self._receiver.open
+        self.due = None
+        if not self._garbles:
+            self._deaf_until = _FOR_EVER if moment is None else moment
 
     def hear(self, heard: Heard) -> None:
         """Bytes have arrived."""
@@ -127,7 +174,7 @@ class NetworkPort:
                 if start < size and self._deaf_until > heard.start:
                     start = max(start, heard.begun_before(self._deaf_until))
             elif type(event) is LineFault:
-                self._tell(ReportKind.LOST, f"a packet whose body is over {MAX_BODY} bytes")
+                self._owner.tell(ReportKind.LOST, f"a packet whose body is over {MAX_BODY} bytes")
             # An ACK is of no consequence to a SAC: it sends nothing that it would repeat.
         self.receiving = self._receiver.open or self._waits_for is not None
         self._see_what_is_due()
@@ -167,7 +214,7 @@ class NetworkPort:
             data = self._outbox.pop(0)[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
         self._see_what_is_due()
-        return data
+        return data.translate(_GARBLED) if self._garbles else data
 
     def _busy_until(self) -> Ns:
         """When the answer that waits, or is on its way, is out, and a packet may follow."""
@@ -183,7 +230,7 @@ class NetworkPort:
         general = packet.dest == GENERAL_CALL
         self.packets += 1
         if general and wrong:
-            self._tell(ReportKind.LOST, "broadcast with a wrong CRC")
+            self._owner.tell(ReportKind.LOST, "broadcast with a wrong CRC")
             return
         # The NUL after the trigger byte delays what the device does next. While it makes a NAK it
         # goes on receiving, so that all bytes do up to the next STX (both as recorded).
@@ -201,13 +248,15 @@ class NetworkPort:
         if answered:
             if self._answer is not None:
                 # Only at line rates that outrun the turnaround.
-                self._tell(ReportKind.LOST, "an answer that had not begun when the next was due")
+                self._owner.tell(
+                    ReportKind.LOST, "an answer that had not begun when the next was due"
+                )
             self._answer = (nak if wrong else ack)(packet.src, self.address)
         self._answer_at = replies
         if self._turnaround and not self._robust and (answered if wrong else not run):
             self._waits_for = (limit, size)
         if wrong:
-            self._tell(
+            self._owner.tell(
                 ReportKind.LOST, f"a packet from {packet.src} with a wrong CRC; it gets a NAK"
             )
             return
@@ -219,7 +268,7 @@ class NetworkPort:
                 self._deaf_until = replies + self._answer_span + _DEAF_AFTER_ANSWER[size]
             else:
                 self._deaf_until = handled + _DEAF_AFTER_BROADCAST[size]
-        self._accept(packet.body, packet.src, packet.dest, triggered)
+        self._owner.network_line(packet.body, packet.src, packet.dest, triggered)
 
     def _put_off(self, heard: Heard, limit: int, size: int) -> None:
         """Bytes come before the answer has begun: it counts from their end instead."""

@@ -1,25 +1,27 @@
 """A SAC: network port, message processor, command processor and motion engine put together.
 
-Owns the node as the bus sees it (the contract of ``sacbus.node``) and the wiring of its parts;
-each part's rules are in its own file.
+Owns the node as the bus sees it (the contract of ``sacbus.node``), the wiring of its parts, and
+what its boots set up; each part's rules are in its own file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from nodes.sac.boot import LISTENS, OFF, VERSION_LINE, Start
 from nodes.sac.command import CommandProcessor, shortest
 from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
+from nodes.sac.pins import Outputs, outputs
 from nodes.sac.queries import Query, answer
 from nodes.sac.screens import Flags
 from nodes.sac.settings import SacSettings
 from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import LineRate, Ns
-from sacbus.language import Session
-from sacbus.motion import Timebase
+from sacbus.language import Session, Stop
+from sacbus.motion import Drive, Timebase
 from sacbus.node import Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
@@ -27,27 +29,38 @@ __all__ = ["SacNode"]
 
 
 class SacNode:
-    """One virtual SAC. Starts booted, with the factory's memory as its settings give it."""
+    """One virtual SAC, with the factory's memory as its settings give it.
+
+    It starts booted, or cold if its settings say so: then it is deaf for a second of bus time.
+    """
 
     kind = "sac"
 
     __slots__ = (
         "_commands",
+        "_configured",
         "_engine",
         "_memory",
         "_messages",
+        "_microstep_pins",
         "_network",
         "_now",
         "_rate",
         "_settings",
+        "_start",
         "_tell_bus",
         "_terminal",
         "_xclk_hz",
+        "eeprom",
+        "memory_changed",
+        "rst",
+        "throttles",
     )
 
     def __init__(
         self, address: int, settings: SacSettings, rate: LineRate, tell: Callable[[Report], None]
     ) -> None:
+        self._configured = address
         self._settings = settings
         self._rate = rate
         self._tell_bus = tell
@@ -55,32 +68,41 @@ class SacNode:
         self._terminal: TerminalPort | None = None
         #: Frequency of the clock at the xclk pin.
         self._xclk_hz = settings.xclk_hz
-        self._boot(settings.factory_memory(address))
+        #: Level of the RST pin; while it is 0, a cold boot restores the factory's memory.
+        self.rst = 1
+        #: Called each time the contents of the EEPROM have changed.
+        self.memory_changed: Callable[[], None] | None = None
+        #: What the EEPROM holds; what the node obeys is what it held at the last boot.
+        self.eeprom = self._factory_memory()
+        #: The boot that is under way; None most of a node's life.
+        self._start: Start | None = None
+        self._boot(0, cold=settings.boot == "cold")
 
-    def _boot(self, memory: Memory) -> None:
-        """Start anew with this memory, as after a cold boot."""
-        self._memory = memory
-        settings = self._settings
-        self._engine = Engine(settings.oscillator, self._external_clock())
+    def _factory_memory(self) -> Memory:
+        return self._settings.factory_memory(self._configured, self._rate.baud)
+
+    def _boot(self, now: Ns, *, cold: bool) -> None:
+        """Begin as after power came, with what the EEPROM holds; not ``cold``: without the wait."""
+        memory = self._memory = self.eeprom
+        self._engine = Engine(self._settings.oscillator, self._external_clock())
         self._commands = CommandProcessor(
-            Session.start(memory.defaults()),
-            memory.drive(
-                auto_micro=settings.auto_micro,
-                pull_in_rpm=settings.pull_in_rpm,
-                pull_out=settings.pull_out_curve,
-            ),
-            self._engine,
-            self,
+            Session.start(memory.defaults()), self._drive(), self._engine, self
         )
-        self._commands.switch_ops(on=bool(memory.soft_ops))
-        self._network = NetworkPort(
-            memory.d_id, self._settings, self._rate, self._network_line, self._tell
-        )
-        self._network.ack = bool(memory.ack)
-        self._network.crc = bool(memory.crc)
-        self._messages = MessageProcessor(
-            self._commands, self._network.send, self._tell_line, self._terminal
-        )
+        if memory.queue is not None:
+            self._commands.queue.load(memory.queue)
+        self._network = NetworkPort(self._settings, self._rate, self)
+        self._messages = MessageProcessor(self._commands, self, self._terminal)
+        #: Levels of MS3 MS2 MS1, bits 2 to 0: low until a driver's table says otherwise.
+        self._microstep_pins = 0
+        self._network.set_up(memory)
+        self._reset_session()
+        if cold:
+            self._network.listen_from(now + LISTENS)
+            self._start = Start(now + LISTENS, listens=True)
+            if self._terminal is not None:
+                self._terminal.boot(VERSION_LINE)
+        else:
+            self._start = Start(now) if memory.autorun else None
 
     @property
     def address(self) -> int:
@@ -98,7 +120,9 @@ class SacNode:
         self._network.hear(heard)
 
     def wake_at(self) -> Ns | None:
-        """The next answer or packet to send, or the end of the command that runs."""
+        """The next answer or packet to send, the end of the command that runs, or of a boot."""
+        if self._start is not None:
+            return self._start.over
         sends = self._network.due
         ends = self._commands.due
         if sends is None:
@@ -108,11 +132,15 @@ class SacNode:
     def wake(self, now: Ns) -> bytes | None:
         """End what is over; send what is due."""
         self._now = now
+        if self._start is not None:
+            self._end_boot(self._start, now)
         self._commands.wake(now)
         return self._network.wake(now)
 
     def state(self, now: Ns) -> str:
-        """What the engine does; SYNC while a command is held that has not begun."""
+        """What the engine does; SYNC while a command is held that has not begun; OFF."""
+        if self._start is OFF:
+            return "OFF"
         return "SYNC" if self._commands.held is not None else self._engine.state(now).name
 
     def snapshot(self, now: Ns) -> Snapshot:
@@ -137,22 +165,124 @@ class SacNode:
             rotor_steps=rotor / per_step if self._settings.pull_in else None,
         )
 
-    def persist(self) -> Mapping[str, int]:
+    # ---- memory ----
+
+    def persist(self) -> Mapping[str, object]:
         """The EEPROM's contents."""
-        return self._memory.stored()
+        return self.eeprom.stored()
 
     def restore(self, memory: Mapping[str, object]) -> None:
         """Boot with a stored EEPROM; the stored d_id wins over the configured address."""
-        configured = self._memory.d_id
-        restored, remarks = self._memory.restored({**memory, **self._settings.asked_for()})
+        asked = self._settings.asked_for()
+        kept = {name: value for name, value in memory.items() if name not in asked}
+        self.eeprom, remarks = self._factory_memory().restored(kept)
         for remark in remarks:
-            self._tell(ReportKind.WARNING, remark)
-        if restored.d_id != configured:
-            self._tell(
+            self.tell(ReportKind.WARNING, remark)
+        if self.eeprom.d_id != self._configured:
+            self.tell(
                 ReportKind.WARNING,
-                f"EEPROM: d_id {restored.d_id} is stored and wins over the configured {configured}",
+                f"EEPROM: d_id {self.eeprom.d_id} is stored and wins over the configured "
+                f"{self._configured}",
             )
-        self._boot(restored)
+        self._boot(self._now, cold=self._settings.boot == "cold")
+
+    def write(self, memory: Memory) -> None:
+        """Put this into the EEPROM; it is obeyed after the next boot."""
+        if memory == self.eeprom:
+            return
+        self.eeprom = memory
+        if self.memory_changed is not None:
+            self.memory_changed()
+
+    # ---- boots ----
+
+    def power(self, *, on: bool, now: Ns) -> None:
+        """Switch it off, or on again for a cold boot; nothing if it is that already.
+
+        Off, it does nothing and forgets all but its EEPROM, also where its motor stands. Whoever
+        calls this from outside the bus has the bus ask the node anew when it wants to be woken.
+        """
+        self._now = now
+        if on is not (self._start is OFF):
+            return
+        if on:
+            self._boot(now, cold=True)
+        else:
+            self._commands.execute(Stop(grace=False), now)
+            self._network.listen_from(None)
+            self._start = OFF
+
+    def reboot(self, now: Ns) -> None:
+        """The warm boot of ``$R``: parameters anew from EEPROM; queue and motor stay.
+
+        It ends with an event of its own at the same instant: then the bus finds the node at its new
+        address.
+        """
+        before = self._memory
+        memory = self._memory = self.eeprom
+        self._commands.reboot(Session.start(memory.defaults()), self._drive(), now)
+        self._commands.set_clock(self._external_clock() or self._settings.oscillator, now)
+        self._engine.change_microsteps(before.ustep, memory.ustep)
+        self._network.set_up(memory)
+        self._reset_session()
+        self._show_prompt()
+        self._start = Start(now)
+
+    def _reset_session(self) -> None:
+        """The settings of the session are the memory's again."""
+        memory = self._memory
+        #: Whether the encoder turns the speed of continuous motion (EnT), or steps the motor (EnF).
+        self.throttles = False
+        self._commands.switch_ops(on=bool(memory.soft_ops))
+        pins = memory.microstep_pins
+        if pins is not None:
+            self._microstep_pins = pins
+        else:
+            self.tell(
+                ReportKind.WARNING,
+                f"driver {memory.r_id} has no microsteps of 2**{memory.ustep}: pulses are "
+                "multiplied by that, and its pins stay as they are",
+            )
+
+    def _end_boot(self, start: Start, now: Ns) -> None:
+        if start.over is None or start.over > now:
+            return
+        if start.restores or (start.listens and not self.rst):
+            self.write(self._factory_memory())
+            self._boot(now, cold=False)
+        self._start = None
+        if start.listens:
+            self._show_prompt()
+        if self._memory.autorun:
+            self._commands.autorun(self._memory.autorun, now)
+
+    def _show_prompt(self) -> None:
+        if self._terminal is not None:
+            self._terminal.restart()
+
+    def _drive(self) -> Drive:
+        settings = self._settings
+        return self._memory.drive(
+            auto_micro=settings.auto_micro,
+            pull_in_rpm=settings.pull_in_rpm,
+            pull_out=settings.pull_out_curve,
+        )
+
+    # ---- what its parts, and its pins, are asked for ----
+
+    @property
+    def commands(self) -> CommandProcessor:
+        """Its command processor."""
+        return self._commands
+
+    @property
+    def network(self) -> NetworkPort:
+        """Its network port."""
+        return self._network
+
+    def pins(self, now: Ns) -> Outputs:
+        """Levels of its output pins at ``now``."""
+        return outputs(self._memory, self._engine, self._microstep_pins, now)
 
     # ---- the terminal ----
 
@@ -164,9 +294,10 @@ class SacNode:
         return self._terminal
 
     def keys_typed(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive at the terminal port."""
+        """Keys arrive at the terminal port; a cold boot that is under way takes them all."""
         self._now = now
-        self.terminal.take(keys, now)
+        if keys and (self._start is None or not self._start.key()):
+            self.terminal.take(keys, now)
 
     def line_typed(self, line: bytes, now: Ns) -> None:
         """A line was typed at the terminal port."""
@@ -178,13 +309,13 @@ class SacNode:
         flags = Flags(
             gap=commands.gap,
             debug=commands.debug,
-            throttle=False,  # after a boot; no command of this version changes it
-            soft_ops=bool(self._memory.soft_ops),
+            throttle=self.throttles,
+            soft_ops=commands.soft_ops,
             ack=network.ack,
             crc=network.crc,
             source=self._messages.last_source,
         )
-        return answer(query, commands, self._memory, flags)
+        return answer(query, commands, self.eeprom, flags)
 
     # ---- pins ----
 
@@ -205,19 +336,18 @@ class SacNode:
         memory = self._memory
         return None if memory.clock else Timebase.external(memory.xfreq, self._xclk_hz)
 
-    def _network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+    def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
+        """A packet was accepted."""
         self._messages.network_line(body, source, destination, now)
 
     def tell_ops(self, *, start: bool, at: Ns) -> Ns:
         """Soft ops tell everybody that a command starts or ends; when that will be out."""
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
-    def _tell(self, kind: ReportKind, text: str) -> None:
-        self._tell_line(kind, text, "", 0)
-
     def tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:
         """About a command that runs later than it came, or else about the line that has come."""
-        self._tell_line(kind, text, self._messages.line if command is None else command, 0)
+        self.tell(kind, text, self._messages.line if command is None else command, 0)
 
-    def _tell_line(self, kind: ReportKind, text: str, line: str, column: int) -> None:
+    def tell(self, kind: ReportKind, text: str, line: str = "", column: int = 0) -> None:
+        """Report something, now."""
         self._tell_bus(Report(self._now, self.address, kind, text, line, column))

@@ -15,7 +15,6 @@ from nodes.sac.memory import Memory
 from nodes.sac.queue import CONTINUOUS_POSITION, THROW_AWAY_POSITION
 from sacbus.language import (
     QUEUE_LENGTH,
-    Parameter,
     ShowConfiguration,
     ShowMemory,
     ShowQueue,
@@ -42,7 +41,7 @@ def answer(
         case ShowReferences():
             return screens.references(commands.references)
         case ShowConfiguration():
-            return screens.configuration(_values(memory))
+            return screens.configuration(memory.values())
         case ShowSession():
             return screens.session(commands.session, flags)
         case ShowVelocity():
@@ -64,15 +63,7 @@ def _queue(commands: CommandProcessor) -> list[str]:
 
 
 def _memory(memory: Memory, *, debug: bool) -> list[str]:
-    values = _values(memory)
+    values = memory.values()
     if debug:
-        return screens.dump(screens.image(values, (), ()))
-    return screens.eeprom(values, ())
-
-
-def _values(memory: Memory) -> dict[Parameter, int]:
-    """Every parameter as it is stored; the factory's where this memory keeps none."""
-    stored = memory.stored()
-    values = {one: stored.get(one.title.lower(), one.factory) for one in Parameter}
-    values[Parameter.OVERRIDE] = int(not memory.full_step)
-    return values
+        return screens.dump(screens.image(values, memory.pins, memory.queue or ()))
+    return screens.eeprom(values, memory.pins)

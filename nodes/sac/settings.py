@@ -1,27 +1,50 @@
 """What a configuration may say about a SAC.
 
-Owns the settings model: how its receiver and its times behave, its oscillator and its motor, and
-values of persistent parameters. Those of the last that are given win over an EEPROM that is already
-there, as if they had been configured; only the address does not (``SacNode.restore``).
+Owns the settings model: how its receiver and its times behave, its oscillator and its motor, how it
+starts, and values of persistent parameters, whose limits stand in ``sacbus.language.Parameter``.
+Those of the last that are given win over an EEPROM that is already there, as if they had been
+configured; only the address does not (``SacNode.restore``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
 
-from nodes.sac.memory import Memory
-from sacbus.motion import FACTORY_XFREQ, Drive, PullOut, Timebase
+from nodes.sac.memory import BAUD, Memory, name_of
+from sacbus.language import Parameter
+from sacbus.motion import Drive, PullOut, Timebase
 from sacbus.node import NodeSettings, SettingError
 
 __all__ = ["SacSettings"]
 
-#: Settings that are persistent parameters as well; those that have another name there.
-_PERSISTENT: Final = (
-    *("linear", "ustep", "slow", "sprf", "cycle", "soft_ops", "ack", "crc"),
-    *("clock", "xfreq"),
-)
-_PARAMETER: Final = {"linear": "ramp"}
+#: The settings that are persistent parameters: all of these but the address, by their names but
+#: one, whose values are words for a flag.
+_PARAMETERS: Final[Mapping[str, Parameter]] = {
+    "linear" if parameter is Parameter.RAMP else name_of(parameter): parameter
+    for parameter in Parameter
+    if parameter is not Parameter.D_ID
+}
+
+
+# Any: what dataclasses.field gives stands for a value of the field's type.
+def _flag(parameter: Parameter, words: str) -> Any:  # noqa: ANN401
+    """A setting that is a parameter of 0 or 1."""
+    return field(default=bool(parameter.factory), metadata={"help": words})
+
+
+def _number(parameter: Parameter, words: str) -> Any:  # noqa: ANN401
+    """A setting that is a parameter with a number."""
+    low = 0 if parameter.zero is None else 1
+    limits = {"low": low, "high": parameter.largest, "help": words}
+    return field(default=parameter.factory, metadata=limits)
+
+
+def _rate(parameter: Parameter, port: str) -> Any:  # noqa: ANN401
+    """A port's rate, which may be left to the line."""
+    words = f"baud of the {port} port; 0: as the line if it is on it, else {BAUD}"
+    return field(default=0, metadata={"low": 0, "high": parameter.largest, "help": words})
 
 
 @dataclass(frozen=True)
@@ -43,27 +66,43 @@ class SacSettings(NodeSettings):
         default=True,
         metadata={"help": "lose what arrives while a packet is handled, as the device does"},
     )
-    ack: bool = field(default=True, metadata={"help": "answer packets with ACK or NAK"})
-    crc: bool = field(default=True, metadata={"help": "send a CRC with the node's own packets"})
-    soft_ops: bool = field(
-        default=False,
-        metadata={"help": "broadcast DC1 when a command starts and DC2 when it ends"},
+    boot: str = field(
+        default="booted",
+        metadata={
+            "choices": ("booted", "cold"),
+            "help": "booted: obeys from the start; cold: first the second in which it is deaf",
+        },
     )
-    linear: bool = field(default=False, metadata={"help": "linear ramps by default"})
-    ustep: int = field(
-        default=0, metadata={"low": 0, "high": 7, "help": "microsteps, as a power of two"}
+    ack: bool = _flag(Parameter.ACK, "answer packets with ACK or NAK")
+    crc: bool = _flag(Parameter.CRC, "send a CRC with the node's own packets")
+    soft_ops: bool = _flag(
+        Parameter.SOFT_OPS, "broadcast DC1 when a command starts and DC2 when it ends"
     )
-    sprf: int = field(
-        default=200, metadata={"low": 1, "high": 65_535, "help": "full steps per revolution"}
+    ops: int = _number(Parameter.OPS, "op_sa and op_sb tell of commands; 0: both stay low")
+    linear: bool = _flag(Parameter.RAMP, "linear ramps by default")
+    ustep: int = _number(Parameter.USTEP, "microsteps, as a power of two")
+    r_id: int = _number(Parameter.R_ID, "driver: 0 A4988, 1 DRV8825, 2 by its own pin map")
+    override: bool = _flag(Parameter.OVERRIDE, "commands count pulses instead of full steps")
+    sprf: int = _number(Parameter.SPRF, "full steps per revolution")
+    slow: int = _number(Parameter.SLOW, "RPM up to which there are no ramps")
+    cycle: int = _number(Parameter.CYCLE, "default velocity, us per full step")
+    acc: int = _number(Parameter.ACC, "default acceleration, harmonic, in hundredths")
+    dec: int = _number(Parameter.DEC, "default deceleration, harmonic, in hundredths")
+    l_acc: int = _number(Parameter.L_ACC, "default acceleration, linear, in hundredths")
+    l_dec: int = _number(Parameter.L_DEC, "default deceleration, linear, in hundredths")
+    cw: bool = _flag(Parameter.CW, "level of the dir pin that is clockwise")
+    dir: bool = _flag(Parameter.DIR, "level of the dir pin in the default direction")
+    pulse: int = _number(Parameter.PULSE, "width of a pulse at clk, us")
+    ihd: int = _number(Parameter.IHD, "half microseconds taken from every period; 8 is exact")
+    xclk: int = _number(Parameter.XCLK, "half microseconds added to every period")
+    autorun: int = _number(
+        Parameter.AUTORUN, "loop from queue position 1 to this one after a boot; 0: none"
     )
-    slow: int = field(
-        default=10,
-        metadata={"low": 1, "high": 255, "help": "RPM up to which there are no ramps"},
+    network: bool = _flag(
+        Parameter.NETWORK, "network at the hardware port, terminal at the software port"
     )
-    cycle: int = field(
-        default=3000,
-        metadata={"low": 1, "high": 2**32 - 1, "help": "default velocity, us per full step"},
-    )
+    hw: int = _rate(Parameter.HW, "hardware")
+    sw: int = _rate(Parameter.SW, "software")
 
     ppm: int = field(
         default=0,
@@ -73,17 +112,11 @@ class SacSettings(NodeSettings):
             "help": "its oscillator runs too fast by this many parts in a million",
         },
     )
-    clock: bool = field(
-        default=True,
-        metadata={"help": "pulses are timed by its own oscillator; off: by the clock at xclk"},
+    clock: bool = _flag(
+        Parameter.CLOCK, "pulses are timed by its own oscillator; off: by the clock at xclk"
     )
-    xfreq: int = field(
-        default=FACTORY_XFREQ,
-        metadata={
-            "low": 1,
-            "high": 2**32 - 1,
-            "help": "what it takes the frequency of the clock at xclk to be, Hz",
-        },
+    xfreq: int = _number(
+        Parameter.XFREQ, "what it takes the frequency of the clock at xclk to be, Hz"
     )
     xclk_hz: int = field(
         default=0,
@@ -138,17 +171,17 @@ class SacSettings(NodeSettings):
         points = (point.partition(":") for point in self.pull_out.split(",") if point)
         return tuple((int(rpm), int(acceleration)) for rpm, _, acceleration in points)
 
-    def factory_memory(self, address: int) -> Memory:
-        """The EEPROM at the first boot of a node that is configured at ``address``."""
-        return replace(
-            Memory(d_id=address),
-            **{_PARAMETER.get(name, name): int(getattr(self, name)) for name in _PERSISTENT},
-        )
+    def factory_memory(self, address: int, line: int = BAUD) -> Memory:
+        """The EEPROM at the first boot of a node at ``address``, on a line of ``line`` baud."""
+        values = {one: int(getattr(self, name)) for name, one in _PARAMETERS.items()}
+        network = values[Parameter.NETWORK]
+        born = Memory(d_id=address, line=line, network=network)
+        for port in (Parameter.HW, Parameter.SW):
+            values[port] = values[port] or born.factory(port)
+        return born.with_values(values)
 
-    def asked_for(self) -> dict[str, int]:
+    def asked_for(self) -> frozenset[str]:
         """The persistent parameters that somebody set, by their names in memory."""
-        return {
-            _PARAMETER.get(name, name): int(getattr(self, name))
-            for name in _PERSISTENT
-            if name in self.given
-        }
+        return frozenset(
+            name_of(parameter) for name, parameter in _PARAMETERS.items() if name in self.given
+        )

@@ -26,11 +26,13 @@ STANDING: Final = 8
 class _Seat:
     """A node's place on the bus and its appointments with the kernel."""
 
-    __slots__ = ("due", "node", "order", "standing")
+    __slots__ = ("address", "due", "node", "order", "standing")
 
     def __init__(self, node: Node, order: int) -> None:
         self.node = node
         self.order = order
+        #: Where bytes are looked for that it must hear.
+        self.address = node.address
         #: The appointment that counts, and all that stand, by their times.
         self.due: Ns | None = None
         self.standing: dict[Ns, Appointment] = {}
@@ -129,13 +131,14 @@ class _Routes:
     def add(self, node: Node) -> None:
         seat = _Seat(node, len(self.seats))
         self.seats.append(seat)
-        self._by_address.setdefault(node.address, []).append(seat)
+        self._by_address.setdefault(seat.address, []).append(seat)
         self._see_if_open(seat)
         self._appoint(seat)
 
     def touch(self, node: Node) -> None:
         for seat in self.seats:
             if seat.node is node:
+                self._follow(seat)
                 self._see_if_open(seat)
                 self._appoint(seat)
 
@@ -196,8 +199,18 @@ class _Routes:
         data = node.wake(when)
         if data:
             self.transmit(node, data)
+        if node.address != seat.address:
+            self._follow(seat)
         self._see_if_open(seat)
         self._appoint(seat)
+
+    def _follow(self, seat: _Seat) -> None:
+        """See to it that a node is found at the address that it has now."""
+        self._by_address[seat.address].remove(seat)
+        seat.address = seat.node.address
+        seats = self._by_address.setdefault(seat.address, [])
+        seats.append(seat)
+        seats.sort(key=lambda one: one.order)
 
     def _see_if_open(self, seat: _Seat) -> None:
         if seat.node.receiving:

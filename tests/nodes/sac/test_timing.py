@@ -169,4 +169,4 @@ def test_the_clock_is_persistent_and_a_setting_that_is_given_wins() -> None:
     assert isinstance(made, SacSettings)
     memory = made.factory_memory(10)
     assert (memory.clock, memory.xfreq) == (0, 2_000_000)
-    assert made.asked_for() == {"clock": 0, "xfreq": 2_000_000}
+    assert made.asked_for() == {"clock", "xfreq"}

@@ -1,0 +1,49 @@
+"""How a SAC starts: cold, when power comes, and warm, at ``$R``.
+
+Owns the second after power came, in which the network is not heard and any key restores the
+factory's memory, and what the terminal shows meanwhile. What a boot sets up is the node's business.
+
+    power comes -> version line -> 1 s: a key, or RST that is low, restores -> prompt -> autorun
+    $R -> prompt -> autorun
+
+Source: manual, "Miscellaneous" (the bail-out option), "network" (RST), "Autorun"; spec, "Version
+line and prompt".
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sacbus.kernel import SECOND, Ns
+
+__all__ = ["LISTENS", "OFF", "VERSION_LINE", "Start"]
+
+#: How long a key restores the factory's memory (manual: "approximately a one second delay").
+LISTENS: Final[Ns] = SECOND
+
+#: The manual mentions it and shows none (decision). It is the emulated firmware's, not ours.
+VERSION_LINE: Final = "SAC v1.0"
+
+
+class Start:
+    """A boot that is under way. ``over``: when it is over; None: the power is off.
+
+    A cold one ``listens``: a key restores the factory's memory.
+    """
+
+    __slots__ = ("listens", "over", "restores")
+
+    def __init__(self, over: Ns | None, *, listens: bool = False) -> None:
+        self.over = over
+        self.listens = listens
+        #: Whether it ends with the factory's memory.
+        self.restores = False
+
+    def key(self) -> bool:
+        """A key has come on the terminal; False when it is an ordinary one."""
+        self.restores = self.restores or self.listens
+        return self.listens or self.over is None
+
+
+#: No power: nothing starts, and keys come to nobody.
+OFF: Final = Start(None)
