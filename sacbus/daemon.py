@@ -18,12 +18,13 @@ from typing import Final, assert_never
 from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, LivePort, Port
 from sacbus.console import Console
 from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
-from sacbus.kernel import US, Kernel, LineRate, Ns
+from sacbus.kernel import SECOND, US, Kernel, LineRate, Ns
 from sacbus.links import Link, Tuning
 from sacbus.links.link import Server
 from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt, terminal_path
 from sacbus.mother import Mother
 from sacbus.node import (
+    BOOT,
     Heard,
     Node,
     Protocol,
@@ -156,6 +157,12 @@ class HostedBus:
             raise KeyError(f"node {address} has no terminal port")
         console.open(link)
         self.terminals[address] = link
+
+    async def booted(self) -> None:
+        """Wait until no node is on its way from power to obedience."""
+        while starting := [one for one in self.bus.nodes if one.state(self.now()) == BOOT]:
+            over = max(one.wake_at() or 0 for one in starting)
+            await asyncio.sleep((over - self.now()) / SECOND / self.configuration.speed)
 
     def tell(self, text: str) -> None:
         """Report something about the line or a link, now."""

@@ -18,7 +18,7 @@ from sacbus.language.queue_file import read_rows
 from sacbus.language.queue_screen import QueueScreen
 from sacbus.links import PathTaken
 from sacbus.links.places import PtyAt
-from tests.serving import PATIENCE, Sacbus, client, served, started
+from tests.serving import PATIENCE, Sacbus, client, served, started, until
 from tests.terminal.rig import person
 
 pytestmark = pytest.mark.slow
@@ -63,6 +63,22 @@ def test_a_program_opens_the_terminal_of_a_node_and_reads_its_screens(tmp_path: 
         assert sacbus.send_signal(signal.SIGTERM) == 0
         (bus,) = sacbus.read_event("stopped")["buses"]
         assert [node["position_steps"] > 0 for node in bus["nodes"]] == [False, True, False]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nodes_that_boot_have_done_so_before_anybody_is_told_where_their_terminals_are() -> None:
+    # So the first key restores nothing: the queue in the EEPROM is kept.
+    with served("--terminals", "--ephemeral", "--set", "boot=cold") as sacbus:
+        assert ask(terminal(sacbus, 10), b"vd") == "vd\r\n100 RPM  cycle 3000\r\nSAC>"
+
+
+def test_a_signal_ends_it_while_nodes_still_boot(tmp_path: Path) -> None:
+    path = tmp_path / "sacbus"
+    options = ("--set", "boot=cold", "--speed", "0.0001", "--pty", str(path))
+    with started("serve", "--ephemeral", "--json", *options) as sacbus:
+        until(path.is_symlink)
+        assert sacbus.send_signal(signal.SIGTERM) == 0
+        assert sacbus.errors() == ""
     assert list(tmp_path.iterdir()) == []
 
 
