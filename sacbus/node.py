@@ -21,6 +21,7 @@ from typing import Protocol as Contract
 from sacbus.kernel import LineRate, Ns
 
 __all__ = [
+    "BOOT",
     "EVERYONE",
     "GROUP",
     "Decoder",
@@ -54,6 +55,10 @@ GROUP: Final = "sacbus.nodes"
 
 #: What :meth:`Protocol.addressed` gives when all nodes must hear.
 EVERYONE: Final = None
+
+
+#: The state of a node that has power and does not obey yet.
+BOOT: Final = "BOOT"
 
 
 @dataclass(slots=True)
@@ -247,7 +252,8 @@ class Node(Contract):
     def state(self, now: Ns) -> str:
         """The state that its snapshot would give at ``now``, at a fraction of the cost.
 
-        A node that does nothing is in STANDBY, whatever its kind.
+        A node that does nothing is in STANDBY, whatever its kind; one that starts and does not
+        obey yet in BOOT, and wakes when that is over.
         """
         ...
 

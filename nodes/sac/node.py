@@ -23,7 +23,7 @@ from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import LineRate, Ns
 from sacbus.language import Session, Stop
 from sacbus.motion import Drive, Timebase
-from sacbus.node import Heard, Report, ReportKind, Snapshot
+from sacbus.node import BOOT, Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
 __all__ = ["SacNode"]
@@ -168,9 +168,9 @@ class SacNode:
         return self._exchanged.say(now)
 
     def state(self, now: Ns) -> str:
-        """What the engine does; SYNC while a command is held that has not begun; OFF."""
-        if self._start is OFF:
-            return "OFF"
+        """What the engine does; SYNC while a command is held that has not begun; OFF; BOOT."""
+        if self._start is not None:
+            return "OFF" if self._start is OFF else BOOT
         return "SYNC" if self._commands.held is not None else self._engine.state(now).name
 
     def snapshot(self, now: Ns) -> Snapshot:
