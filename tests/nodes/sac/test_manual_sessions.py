@@ -116,7 +116,7 @@ def test_parameters_that_are_entered_before_a_continuous_command_persist(sitting
     sitting.enters("S")
     session = sitting.session()
     assert (session["RPM"], session["acc"], session["dec"]) == ("120", "0.80", "1.20")
-    # "With a normal Qdump, buff[0] is not visible. It is visible under debug."
+    # buff[0] "is not visible" with a normal Qdump; "it is visible under debug".
     assert "\r\n0\t" not in sitting.enters("q")
     sitting.enters("b")
     assert sitting.row(0) == "0\t0\tCW\t120\t2500\t0.80\t1.20\t0\t0"
