@@ -19,6 +19,7 @@ __all__ = ["eeprom_group"]
 
 
 @click.group("eeprom")
+@verbose
 def eeprom_group() -> None:
     """Look into the EEPROM files of nodes.
 
