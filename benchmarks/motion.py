@@ -9,8 +9,9 @@ at wall time. Each runs its queue of one-second commands: from rest to 33.3 kHz 
 vc480), cruise, and to rest again, one way and the other. Their ends are spread over the second, so
 that nothing is done for two at a time. Nobody asks for pulses, and the line is quiet: queues are
 filled between the spells that are measured, by broadcasts in virtual time. The figure is processor
-time of the whole process: the ends and beginnings of commands, the kernel, and the event loop,
-whose timers alone, for as many empty appointments, are the baseline.
+time of the whole process: the ends and beginnings of commands, the kernel, and the event loop.
+Nobody could tell when within some ms a command ends, so the host ends several at one wake-up. The
+baseline is as many appointments at which nothing is done, each punctual: 762 wake-ups a second.
 """
 
 from __future__ import annotations
@@ -270,7 +271,7 @@ async def spell(kernel: Kernel) -> float:
 
 
 def nothing_much(kernel: Kernel) -> None:
-    """As many appointments a second as there are engines, and nothing done at them."""
+    """As many appointments a second as there are engines, and nothing done at them but in time."""
 
     def happen(when: Ns) -> None:
         kernel.at(when + SECOND, happen, when + SECOND)

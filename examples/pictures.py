@@ -16,9 +16,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sacbus.fresh import fresh_file
 from sacbus.motion import TICKS_PER_US, Drive
 from sacbus.plan import Planned, plan_sequence
-from sacbus.plan.fresh import fresh_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

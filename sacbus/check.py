@@ -15,7 +15,7 @@ from sacbus.config.keys import shown
 from sacbus.config.notation import endpoint_text, ranges
 from sacbus.config.reading import Examined
 from sacbus.daemon import Configuration, check
-from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt
+from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt, terminal_path
 
 __all__ = ["as_json", "as_text"]
 
@@ -46,6 +46,9 @@ def as_text(examined: Examined) -> Iterator[str]:
             yield f"  {word} {ranges(addresses)}: {kind}{given}"
         for place in bus.links:
             yield f"  {_KINDS[type(place)]} {_where(place)}".rstrip()
+        if bus.terminals:
+            path = terminal_path(bus.links, "ADDRESS")
+            yield "  terminals" if path is None else f"  terminals {path}"
         yield f"  state {'kept in memory only' if bus.state is None else bus.state / bus.name}"
 
 
@@ -74,6 +77,7 @@ def _bus(bus: Configuration) -> dict[str, Any]:
         "lanes": bus.lanes or protocol.lanes,
         "seed": bus.seed,
         "pace": bus.pace,
+        "terminals": bus.terminals,
         "speed": bus.speed,
         "state": None if bus.state is None else str(bus.state / bus.name),
         "nodes": [dataclasses.asdict(node) for node in bus.every_node],

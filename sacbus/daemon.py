@@ -16,13 +16,15 @@ from random import Random
 from typing import Final, assert_never
 
 from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, LivePort, Port
+from sacbus.console import Console
 from sacbus.host import Host, RealHost, VirtualHost, VirtualLoop
-from sacbus.kernel import US, Kernel, LineRate, Ns
+from sacbus.kernel import SECOND, US, Kernel, LineRate, Ns
 from sacbus.links import Link, Tuning
 from sacbus.links.link import Server
-from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt
+from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt, terminal_path
 from sacbus.mother import Mother
 from sacbus.node import (
+    BOOT,
     Heard,
     Node,
     Protocol,
@@ -59,7 +61,7 @@ class Configuration:
     A node that is a mere address is of ``kind``, with ``settings``; a bus without nodes speaks the
     protocol of ``kind``. ``baud`` and ``lanes`` override the protocol's. ``state``: the directory
     for the nodes' EEPROM, None keeps it in memory. ``speed`` scales bus time; ``pace`` False lets
-    the line run ahead of the clock.
+    the line run ahead of the clock. ``terminals``: a pty for each node's terminal port.
     """
 
     nodes: tuple[NodeAt | int, ...] = (10, 11, 12)
@@ -73,6 +75,7 @@ class Configuration:
     state: Path | None = None
     speed: float = 1.0
     pace: bool = True
+    terminals: bool = False
 
     @property
     def every_node(self) -> tuple[NodeAt, ...]:
@@ -97,6 +100,9 @@ class HostedBus:
         #: Ports of programs that have left, which may have something to send yet.
         self._leaving: list[Port] = []
         self._mothers: list[Mother] = []
+        #: Where programs get at the nodes' terminals, by the addresses of the configuration.
+        self.terminals: dict[int, Link] = {}
+        self._consoles: dict[int, Console] = {}
         #: Nodes in the order of the configuration, whose addresses name their memory.
         self._configured = tuple(zip(configuration.every_node, bus.nodes, strict=True))
 
@@ -118,6 +124,45 @@ class HostedBus:
     def snapshot(self, address: int) -> Snapshot:
         """One node as it is now; KeyError when there is none."""
         return self.bus.node(address).snapshot(self.now())
+
+    def terminal(self, address: int) -> Console:
+        """The terminal of a node, to type at and to read; KeyError when there is none.
+
+        What the node shows is kept for who reads it from the first time on that this is called.
+        """
+        node = self.bus.node(address)
+        console = self._console(node)
+        if console is None:
+            raise KeyError(f"node {address} has no terminal port")
+        console.listen()
+        return console
+
+    def _console(self, node: Node) -> Console | None:
+        if id(node) not in self._consoles:  # a node lasts as long as its bus
+            port = node.terminal
+            if port is None:
+                return None
+            self._consoles[id(node)] = Console(node, port, self.bus, self.host)
+        return self._consoles[id(node)]
+
+    def attach_terminal(self, address: int, link: Link) -> None:
+        """Open a link to the terminal of the node that is configured at ``address``.
+
+        LinkError when the link cannot be had, KeyError when the node has no terminal, as in
+        :meth:`terminal`. It is closed with the bus.
+        """
+        node = next((node for at, node in self._configured if at.address == address), None)
+        console = None if node is None else self._console(node)
+        if console is None:
+            raise KeyError(f"node {address} has no terminal port")
+        console.open(link)
+        self.terminals[address] = link
+
+    async def booted(self) -> None:
+        """Wait until no node is on its way from power to obedience."""
+        while starting := [one for one in self.bus.nodes if one.state(self.now()) == BOOT]:
+            over = max(one.wake_at() or 0 for one in starting)
+            await asyncio.sleep((over - self.now()) / SECOND / self.configuration.speed)
 
     def tell(self, text: str) -> None:
         """Report something about the line or a link, now."""
@@ -236,7 +281,7 @@ class HostedBus:
                 stack.callback(mother.lose, "the bus is closed")
             for port in (*self._ports, *self._leaving):
                 stack.callback(port.close)
-            for link in self.links:
+            for link in (*self.links, *self.terminals.values()):
                 stack.callback(link.close)
 
     def keep(self, state: StateDirectory) -> Callable[[], None]:
@@ -314,6 +359,8 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
         stack.callback(hosted.close)
         for place in configuration.links:
             await _open_link(hosted, place)
+        if configuration.terminals:
+            _open_terminals(hosted)
         if state is not None:
             # Last, so that a bus that never ran overwrites nobody's memory; and at once, so that
             # what is killed has left as much as what is ended.
@@ -363,6 +410,23 @@ async def _open_link(bus: HostedBus, place: Place) -> None:
             bus.attach_live(AdapterLink(path, baud, rts=rts, echo=echo, tell=bus.tell))
         case _:
             assert_never(place)
+
+
+def _open_terminals(bus: HostedBus) -> None:
+    """A pty for the terminal of every node that has one."""
+    from sacbus.links import PtyLink
+    from sacbus.links.presence import Presence
+
+    # One for all: a user may have 128 of what it takes, and a bus 250 nodes.
+    presence = Presence()
+    for node in bus.configuration.every_node:
+        path = terminal_path(bus.configuration.links, node.address)
+        link = PtyLink(path, baud=bus.bus.rate.baud, presence=presence)
+        try:
+            bus.attach_terminal(node.address, link)
+        except KeyError:
+            what = f"a node of kind {node.kind} has no terminal port, so none is served"
+            bus.bus.tell(Report(bus.now(), node.address, ReportKind.WARNING, what))
 
 
 def check(configuration: Configuration) -> Protocol:

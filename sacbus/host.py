@@ -7,7 +7,9 @@ host says so.
 - *Real* (:class:`RealHost`): bus time follows the loop's clock, times ``speed``, against one
   absolute anchor, so that a late wake-up delays one event and never shifts those that follow. It is
   as precise as the loop it runs on (``selector.py`` makes precise ones), and measures how late it
-  runs its events. With ``line_free_at`` the line does not wait for the clock.
+  runs its events. Quiet ones (``kernel.py``) wait for each other, since waking the process costs
+  more than what is done at them: up to ``LEISURE``, and no longer than until somebody looks or
+  something comes in. With ``line_free_at`` the line does not wait for the clock.
 - *Virtual* (:class:`VirtualLoop`): an event loop whose clock *is* the kernel's. When nothing else
   is ready it jumps to the next event or timer. The same run every time, as fast as it computes.
 """
@@ -22,17 +24,37 @@ from math import inf
 from typing import Any, Final, TypeVar, TypeVarTuple
 from typing import Protocol as Contract
 
-from sacbus.kernel import MS, SECOND, Kernel, Ns
+from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from sacbus.lateness import Lateness
 
-__all__ = ["BEHIND", "Host", "RealHost", "Standstill", "VirtualHost", "VirtualLoop", "run_virtual"]
+__all__ = [
+    "BEHIND",
+    "LEAD",
+    "LEISURE",
+    "Host",
+    "RealHost",
+    "Standstill",
+    "VirtualHost",
+    "VirtualLoop",
+    "run_virtual",
+]
 
 _T = TypeVar("_T")
 _Ts = TypeVarTuple("_Ts")
 
-#: Without pace, bus time runs ahead until the line has been quiet for this long: longer than any
+#: Without pace, bus time runs ahead until the line has been idle for this long: longer than any
 #: turnaround (0.92 ms) and link latency (1 ms), so that no answer waits for the clock.
-_QUIET: Final[Ns] = 2 * MS
+_IDLE: Final[Ns] = 2 * MS
+
+#: Wall time that a quiet event may wait for others. A wake-up costs a process some 30 to 100 us; at
+#: 762 of them a second, 5 ms make one of four. More would save little, and what comes in from the
+#: world waits for all that are overdue.
+LEISURE: Final[Ns] = 5 * MS
+
+#: Wall time before an event that is not quiet, at which quiet ones that are due are run rather than
+#: right before it: four take up to 0.2 ms, which it would be late by, and a process that sleeps is
+#: back 0.1 to 0.2 ms after its time.
+LEAD: Final[Ns] = 500 * US
 
 #: Later than this, ns of wall time, an event is worth a word: no scheduler that has nothing better
 #: to do is, and programs that time each other on the line begin to notice.
@@ -56,7 +78,7 @@ class Host(Contract):
         ...
 
     def spare(self) -> float:
-        """Seconds of wall time until something on the bus is due; ``inf`` when nothing ever is."""
+        """Seconds of wall time until the next event that is not quiet; ``inf`` without one."""
         ...
 
     def close(self) -> None:
@@ -72,7 +94,8 @@ class RealHost:
     use (``serve --no-pace``), and by as much motion is ahead too; otherwise it keeps the clock's.
 
     ``lateness`` tells how long after its time by the clock each event ran, in ns of wall time
-    whatever the speed; events of one instant count once, and those that ran ahead not at all.
+    whatever the speed; events of one instant count once, those that ran ahead and quiet ones, which
+    are late on purpose, not at all.
     """
 
     def __init__(
@@ -94,6 +117,9 @@ class RealHost:
         self._spared_until = -inf
         self._loop = loop
         self._speed = speed
+        #: Both in bus time.
+        self._leisure: Ns = round(LEISURE * speed)
+        self._lead: Ns = round(LEAD * speed)
         self._line_free_at = line_free_at
         self._wall_anchor = loop.time()
         self._bus_anchor = kernel.now
@@ -138,8 +164,8 @@ class RealHost:
             self._arm()
 
     def spare(self) -> float:
-        """Seconds until the next event; 0 when one is due, ``inf`` when there is none."""
-        when = self.kernel.next_at()
+        """Seconds until the next event that is not quiet; 0 when one is due, ``inf`` without."""
+        when = self.kernel.next_loud_at()
         if when is None or self._closed:
             return inf
         return max((when - self.bus_now()) / SECOND / self._speed, 0.0)
@@ -156,16 +182,17 @@ class RealHost:
         self.arrive(_nothing)
 
     def _catch_up(self, limit: Ns) -> None:
-        """Run what is due by now, ``limit``, and note how late it is."""
+        """Run what is due by now, ``limit``, and note how late it is, unless it is quiet."""
         kernel = self.kernel
         worst = 0
         # The limit stays, so that whatever the events cost, the loop gets its turn.
         while (when := kernel.next_at()) is not None and when <= limit:
-            # Asked anew: one event may have held up the next.
-            late = int((self.bus_now() - when) / self._speed)
-            self.lateness.note(late)
-            if late > worst:
-                worst = late
+            if when == kernel.next_loud_at():
+                # Asked anew: one event may have held up the next.
+                late = int((self.bus_now() - when) / self._speed)
+                self.lateness.note(late)
+                if late > worst:
+                    worst = late
             kernel.run_until(when)
         kernel.run_until(limit)
         if worst > BEHIND:
@@ -183,15 +210,16 @@ class RealHost:
         """Run the line's events without waiting, and move the anchor by what that gained."""
         kernel = self.kernel
         # Each round may put the line to use for longer; the clock stays at the last event.
-        while (free_at := line_free_at()) is not None and kernel.run_due(free_at + _QUIET):
+        while (free_at := line_free_at()) is not None and kernel.run_due(free_at + _IDLE):
             pass
         # From when this began: what the clock has gone on meanwhile passes on the bus too.
         if kernel.now > now:
             self._bus_anchor += kernel.now - now
+            self._timer_for = None  # the timer that stands would fire too late now
 
     def _arm(self) -> None:
-        """Have the loop call when the next event is due."""
-        when = self.kernel.next_at()
+        """Have the loop call when the next event is due, or a quiet one has waited long enough."""
+        when = self._next_wake_up()
         if self._timer is not None:
             if self._timer_for is not None and when is not None and self._timer_for <= when:
                 return  # it fires early enough, finds nothing due, and arms again
@@ -202,6 +230,15 @@ class RealHost:
         self._timer_for = when
         wait = (when - self._bus_anchor) / SECOND / self._speed
         self._timer = self._loop.call_at(self._wall_anchor + wait, self._due)
+
+    def _next_wake_up(self) -> Ns | None:
+        """When the clock must be moved next, in bus time; None: not before something comes in."""
+        when, loud = self.kernel.next_at(), self.kernel.next_loud_at()
+        if when is None or when == loud:
+            return when
+        # It is quiet.
+        latest = when + self._leisure
+        return latest if loud is None else min(latest, max(when, loud - self._lead))
 
 
 class Standstill(RuntimeError):

@@ -1,13 +1,17 @@
 """The event queue and the only clock of the core, and the units of time.
 
-Owns *when* things happen on the bus: one heap of (time, order, callback) in integer nanoseconds of
+Owns *when* things happen on the bus: a queue of (time, order, callback) in integer nanoseconds of
 bus time; and what a byte takes on a line. Knows neither asyncio nor the wall clock; ``host.py``
 runs it in real, scaled or virtual time. Everything below (medium, nodes, mother's transactions) is
 plain synchronous code that is called from here and asks for its next appointment here.
 
+Some events are *quiet*: nobody outside the process can tell when they ran, as long as they run
+before whatever comes after them. They stand in a heap of their own for one reason: so that a host
+can ask when the next one is due that is not. Order is one for both.
+
 Rules for whoever edits this file: events of one instant run in the order in which they were
-scheduled, on every machine and in every run; ``now`` never goes back; nothing here may ask what
-time it is.
+scheduled, quiet or not, on every machine and in every run; ``now`` never goes back; nothing here
+may ask what time it is.
 """
 
 from __future__ import annotations
@@ -54,9 +58,9 @@ class LineRate:
         return begun + 1 if self.span(begun) < elapsed else begun
 
 
-#: [when, order, callback or None when cancelled or done, arguments]. A list, because heapq compares
-#: it in C and the unique order means that callbacks are never compared. ``Any``: the callback's own
-#: parameters, which the kernel passes on and never looks at.
+#: [when, order, callback or None when cancelled or done, arguments, whether it is quiet]. A list,
+#: because heapq compares it in C and the unique order means that callbacks are never compared.
+#: ``Any``: the callback's own parameters, which the kernel passes on and never looks at.
 Appointment = list[Any]
 
 
@@ -71,12 +75,14 @@ class Kernel:
     Times are ints, ns since the start. Benchmarked against a bare heapq loop (``make bench``).
     """
 
-    __slots__ = ("_cancelled", "_heap", "_order", "now", "ran")
+    __slots__ = ("_cancelled", "_loud", "_order", "_quiet", "now", "ran")
 
     def __init__(self, start: Ns = 0) -> None:
-        self._heap: list[Appointment] = []
+        #: Heaps, each with appointments of one kind.
+        self._loud: list[Appointment] = []
+        self._quiet: list[Appointment] = []
         self._order = 0
-        #: Cancelled appointments that may still lie in the heap.
+        #: Cancelled appointments that may still lie in the heaps.
         self._cancelled = 0
         #: Bus time, ns. Read by everybody, written by the kernel alone.
         self.now: Ns = start
@@ -91,9 +97,36 @@ class Kernel:
         if when < self.now:
             when = self.now
         self._order = order = self._order + 1
-        appointment: Appointment = [when, order, callback, arguments]
-        heappush(self._heap, appointment)
+        appointment: Appointment = [when, order, callback, arguments, False]
+        heappush(self._loud, appointment)
         return appointment
+
+    def at_leisure(
+        self, when: Ns, callback: Callable[..., object], *arguments: object
+    ) -> Appointment:
+        """As :meth:`at`, for a quiet event: a host in real time need not be punctual with it.
+
+        In bus time, and among all other events, it runs exactly as from :meth:`at`.
+        """
+        if when < self.now:
+            when = self.now
+        self._order = order = self._order + 1
+        appointment: Appointment = [when, order, callback, arguments, True]
+        heappush(self._quiet, appointment)
+        return appointment
+
+    def hasten(self, appointment: Appointment) -> None:
+        """Have a quiet event no longer be quiet, at its time and its place in the order.
+
+        One that is not quiet, has run, or was cancelled, is left in peace.
+        """
+        if appointment[2] is None or not appointment[4]:
+            return
+        appointment[4] = False
+        # It stays in the other heap as well, where it counts as cancelled: being the same, it is
+        # never less than itself, so the one that is not quiet runs.
+        self._cancelled += 1
+        heappush(self._loud, appointment)
 
     def cancel(self, appointment: Appointment) -> None:
         """Forget an appointment. One that has run, or was cancelled, is left in peace."""
@@ -101,14 +134,28 @@ class Kernel:
             return
         appointment[2] = None
         self._cancelled += 1
-        if self._cancelled > _WORTH_CLEARING and self._cancelled * 2 > len(self._heap):
-            self._heap[:] = [one for one in self._heap if one[2] is not None]
-            heapify(self._heap)
+        standing = len(self._loud) + len(self._quiet)
+        if self._cancelled > _WORTH_CLEARING and self._cancelled * 2 > standing:
+            self._loud[:] = [one for one in self._loud if one[2] is not None]
+            self._quiet[:] = [one for one in self._quiet if one[2] is not None and one[4]]
+            heapify(self._loud)
+            heapify(self._quiet)
             self._cancelled = 0
 
     def next_at(self) -> Ns | None:
         """When the next event is due; None when nothing is."""
-        heap = self._heap
+        when = self._first_of(self._loud)
+        if self._quiet:
+            quiet = self._first_of(self._quiet)
+            if when is None or (quiet is not None and quiet < when):
+                return quiet
+        return when
+
+    def next_loud_at(self) -> Ns | None:
+        """When the next event is due that is not quiet; None when none is."""
+        return self._first_of(self._loud)
+
+    def _first_of(self, heap: list[Appointment]) -> Ns | None:
         while heap:
             if heap[0][2] is not None:
                 when: Ns = heap[0][0]
@@ -119,9 +166,11 @@ class Kernel:
 
     def run_until(self, limit: Ns) -> int:
         """Run every event due at or before ``limit``, then move the clock there; how many ran."""
-        heap = self._heap
+        loud, quiet = self._loud, self._quiet
+        ran = 0
         # Asked here already, since mostly nothing is due when bytes come in.
-        ran = self.run_due(limit) if heap and heap[0][0] <= limit else 0
+        if (loud and loud[0][0] <= limit) or (quiet and quiet[0][0] <= limit):
+            ran = self.run_due(limit)
         if limit > self.now:
             self.now = limit
         return ran
@@ -132,10 +181,13 @@ class Kernel:
         Events may schedule others, which run too if they are due. Returns how many ran. An
         exception of a callback is a defect of ours: it leaves the clock at its event and comes out.
         """
-        heap = self._heap
+        loud, quiet = self._loud, self._quiet
         ran = 0
         try:
-            while heap and heap[0][0] <= limit:
+            while True:
+                heap = quiet if quiet and (not loud or quiet[0] < loud[0]) else loud
+                if not heap or heap[0][0] > limit:
+                    break
                 appointment = heappop(heap)
                 callback = appointment[2]
                 if callback is None:

@@ -21,6 +21,7 @@ from typing import Protocol as Contract
 from sacbus.kernel import LineRate, Ns
 
 __all__ = [
+    "BOOT",
     "EVERYONE",
     "GROUP",
     "Decoder",
@@ -32,6 +33,8 @@ __all__ = [
     "Node",
     "NodeKind",
     "NodeSettings",
+    "PinError",
+    "Pins",
     "Protocol",
     "Report",
     "ReportKind",
@@ -52,6 +55,10 @@ GROUP: Final = "sacbus.nodes"
 
 #: What :meth:`Protocol.addressed` gives when all nodes must hear.
 EVERYONE: Final = None
+
+
+#: The state of a node that has power and does not obey yet.
+BOOT: Final = "BOOT"
 
 
 @dataclass(slots=True)
@@ -148,6 +155,47 @@ class Terminal(Contract):
         ...
 
 
+class PinError(ValueError):
+    """A pin that a node does not have, or a level that it cannot have; the text is for users."""
+
+
+class Pins(Contract):
+    """A node's pins: inputs to drive, outputs to look at. Levels are 0 and 1."""
+
+    @property
+    def inputs(self) -> Sequence[str]:
+        """Names of the pins that can be driven."""
+        ...
+
+    @property
+    def outputs(self) -> Sequence[str]:
+        """Names of the pins that the node drives."""
+        ...
+
+    @property
+    def told(self) -> Sequence[str]:
+        """The outputs whose edges a watcher is told of; pulses are too many."""
+        ...
+
+    def drive(self, pin: str, level: int, now: Ns) -> None:
+        """Drive an input. PinError for what is no input, and a level that it cannot have.
+
+        The owner asks the bus to touch the node afterwards (``Bus.touch``).
+        """
+        ...
+
+    def level(self, pin: str, now: Ns) -> int:
+        """The level of any pin at ``now``; PinError if there is none of that name."""
+        ...
+
+    def watch(self, watcher: Callable[[str, int, Ns], object] | None, now: Ns) -> None:
+        """Have ``watcher(pin, level, when)`` called at each edge from ``now`` on; None: nobody.
+
+        The owner asks the bus to touch the node afterwards (``Bus.touch``).
+        """
+        ...
+
+
 class Node(Contract):
     """A device on the bus: a synchronous state machine that is told the time.
 
@@ -170,6 +218,22 @@ class Node(Contract):
         """Its terminal port, made when it is first asked for; None for kinds without one."""
         ...
 
+    @property
+    def pins(self) -> Pins | None:
+        """Its pins, made when first asked for; None for a kind without any."""
+        ...
+
+    @property
+    def quiet(self) -> bool:
+        """True while it will send nothing until it hears something or is touched (``Bus.touch``).
+
+        What it does then when it is woken shows nowhere but in how it looks, and whoever looks
+        brings the bus up to date first. So in real time the bus may let it wait for some ms; by
+        bus time it is woken as exactly as ever. What it reports then is told as late, with the
+        time at which it was. Where in doubt, False: that costs a wake-up of the process each time.
+        """
+        ...
+
     def hear(self, heard: Heard, now: Ns) -> None:
         """Bytes have arrived; ``now`` is when the last of them ended."""
         ...
@@ -188,7 +252,8 @@ class Node(Contract):
     def state(self, now: Ns) -> str:
         """The state that its snapshot would give at ``now``, at a fraction of the cost.
 
-        A node that does nothing is in STANDBY, whatever its kind.
+        A node that does nothing is in STANDBY, whatever its kind; one that starts and does not
+        obey yet in BOOT, and wakes when that is over.
         """
         ...
 

@@ -10,7 +10,7 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 
 from sacbus import __version__
@@ -20,6 +20,7 @@ from sacbus.kernel import MS, SECOND, US, Ns
 from sacbus.lateness import Lateness
 from sacbus.links import Link
 from sacbus.links.link import Server
+from sacbus.links.places import terminal_path
 from sacbus.live import Screen, table
 from sacbus.node import Report
 from sacbus.spare import Job
@@ -62,6 +63,8 @@ class Lines:
             for link in bus.links:
                 way = "on" if link.kind == "adapter" else "connect to"
                 self.say(("  " if several else "") + f"{way} {link.where}\n")
+            for line in _terminal_lines(bus):
+                self.say(("  " if several else "") + f"{line}\n")
         self.say("Ctrl-C ends it\n")
 
     def report(self, bus: HostedBus, report: Report) -> None:
@@ -115,7 +118,12 @@ class Json(Lines):
                 "event": "ready",
                 "version": __version__,
                 "links": [way for ways in self._ways for way in ways],
-                "terminals": {},
+                # Of two nodes with one address on two buses, the first one's; see the buses.
+                "terminals": {
+                    address: path
+                    for bus in reversed(self._buses)
+                    for address, path in _terminals(bus).items()
+                },
                 "buses": [
                     {
                         "name": bus.bus.name,
@@ -126,6 +134,7 @@ class Json(Lines):
                             for one in bus.configuration.every_node
                         ],
                         "links": ways,
+                        "terminals": _terminals(bus),
                     }
                     for bus, ways in zip(self._buses, self._ways, strict=True)
                 ],
@@ -279,6 +288,21 @@ def _population(bus: HostedBus) -> str:
         for kind, nodes in by_kind.items()
     ]
     return f"{', '.join(kinds) or 'no nodes'} at {bus.bus.rate.baud} baud"
+
+
+def _terminals(bus: HostedBus) -> dict[str, str]:
+    return {str(address): link.where for address, link in bus.terminals.items()}
+
+
+def _terminal_lines(bus: HostedBus) -> Iterator[str]:
+    """Where the nodes' terminals are; stable paths differ by the address alone."""
+    if not bus.terminals:
+        return
+    if (pattern := terminal_path(bus.configuration.links, "ADDRESS")) is not None:
+        yield f"terminals at {pattern} ({ranges(bus.terminals)})"
+        return
+    for address, link in bus.terminals.items():
+        yield f"terminal of node {address} at {link.where}"
 
 
 def _links(bus: HostedBus) -> list[dict[str, object]]:

@@ -13,9 +13,9 @@ import signal
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
-from sacbus.daemon import Configuration, open_bus
+from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.feed import FeedServer
 from sacbus.notify import notify
 from sacbus.output import output_for
@@ -58,6 +58,8 @@ async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_
         # 250 nodes, in which the line stands still; what is made from now on is little.
         gc.collect()
         gc.freeze()
+        # A key that came while a SAC boots would restore its factory settings.
+        await _boot(buses, ended)
         output = output_for(buses, lost, as_json=as_json, show_table=show_table)
         output.ready()
         for bus in buses:
@@ -75,6 +77,16 @@ async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_
     output.stopped()
     output.close()
     return status
+
+
+async def _boot(buses: Sequence[HostedBus], ended: asyncio.Future[int]) -> None:
+    """Wait until all nodes obey, or until a signal has come."""
+    booting = asyncio.gather(*(bus.booted() for bus in buses))
+    either: tuple[asyncio.Future[Any], ...] = (ended, booting)  # they give different things
+    await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+    booting.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await booting
 
 
 def _heed_signals(end: Callable[[int], None]) -> None:

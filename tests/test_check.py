@@ -36,6 +36,7 @@ listen = "[::1]:7001"
 [[bus]]
 name = "real"
 state = false
+terminals = true
 lanes = 2
 baud = 9600
 [[bus.links]]
@@ -85,6 +86,7 @@ def test_what_is_right_is_summed_up(capsys: Captured, file: Path) -> None:
             "bus real: sac at 9600 baud, 2 lanes\n"
             "  tcp 127.0.0.1:7000\n"
             "  adapter COM5\n"
+            "  terminals\n"
             "  state kept in memory only\n"
         ),
         "",
@@ -114,10 +116,12 @@ def test_what_is_right_is_told_as_json(capsys: Captured, file: Path) -> None:
         "lanes": 1,
         "seed": 0,
         "pace": True,
+        "terminals": False,
         "speed": 1.0,
         "state": f"{file.parent}/memory/bus",
     }
     assert (right["baud"], right["lanes"], right["state"]) == (9_600, 2, None)
+    assert right["terminals"] is True
     assert right["links"][1] == {"kind": "adapter", "path": "COM5", "rts": False, "echo": False}
 
 

@@ -72,6 +72,17 @@ def test_ten_minutes_of_motion_are_over_at_once_and_exact() -> None:
     assert virtually(scene()) == virtually(scene()) == pytest.approx(200_000, rel=1e-3)
 
 
+def test_a_bus_can_be_waited_for_until_its_nodes_have_booted() -> None:
+    async def scene(boot: str) -> tuple[str, int, str]:
+        async with open_bus(Configuration(settings={"boot": boot})) as bus:
+            before = bus.snapshot(11).state
+            await bus.booted()
+            return before, bus.now() // SECOND, bus.snapshot(11).state
+
+    assert virtually(scene("booted")) == ("STANDBY", 0, "STANDBY")
+    assert virtually(scene("cold")) == ("BOOT", 1, "STANDBY")
+
+
 def test_the_same_configuration_gives_the_same_bytes_at_the_same_times() -> None:
     def trace(seed: int) -> list[tuple[int, bytes, bytes]]:
         found: list[tuple[int, bytes, bytes]] = []

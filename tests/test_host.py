@@ -8,10 +8,20 @@ from __future__ import annotations
 import asyncio
 import socket
 from collections.abc import Awaitable, Callable
+from math import inf
 
 import pytest
 
-from sacbus.host import BEHIND, RealHost, Standstill, VirtualHost, VirtualLoop, run_virtual
+from sacbus.host import (
+    BEHIND,
+    LEAD,
+    LEISURE,
+    RealHost,
+    Standstill,
+    VirtualHost,
+    VirtualLoop,
+    run_virtual,
+)
 from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from tests.nodes.sac.bench import NODE, Bench, Said, packet
 
@@ -149,6 +159,158 @@ def test_after_close_nothing_runs_and_closing_again_is_no_mistake() -> None:
 
     beside(Kernel(), main)
     assert ran == []
+
+
+# ---- quiet events -------------------------------------------------------------------------------
+
+
+def seen_by(wall: Kernel, kernel: Kernel, seen: list[tuple[Ns, Ns]]) -> Callable[[], object]:
+    """An event that notes the bus time and the wall time, in whole us, at which it ran."""
+    return lambda: seen.append((kernel.now, wall.now // US * US))
+
+
+def test_quiet_events_wait_for_each_other_but_not_for_long_and_keep_their_bus_times() -> None:
+    wall, kernel = Kernel(), Kernel()
+    seen: list[tuple[Ns, Ns]] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        for when in (10 * MS, 11 * MS, 10 * MS + LEISURE, 30 * MS):
+            kernel.at_leisure(when, seen_by(wall, kernel, seen))
+        host = RealHost(kernel, loop)
+        await asyncio.sleep(1)
+        host.close()
+
+    beside(wall, main)
+    together = 10 * MS + LEISURE
+    assert seen == [
+        (10 * MS, together),
+        (11 * MS, together),
+        (together, together),
+        (30 * MS, 30 * MS + LEISURE),
+    ]
+
+
+@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
+def test_how_long_quiet_events_may_wait_is_wall_time_whatever_the_speed(speed: float) -> None:
+    wall, kernel = Kernel(), Kernel()
+    seen: list[tuple[Ns, Ns]] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at_leisure(round(10 * MS * speed), seen_by(wall, kernel, seen))
+        kernel.at(round(40 * MS * speed), lambda: None)
+        kernel.at_leisure(round(38 * MS * speed), seen_by(wall, kernel, seen))
+        host = RealHost(kernel, loop, speed=speed)
+        await asyncio.sleep(1)
+        host.close()
+
+    beside(wall, main)
+    assert [at for _, at in seen] == [10 * MS + LEISURE, 40 * MS - LEAD]
+
+
+def test_quiet_events_run_some_time_before_one_that_is_not_so_that_it_is_not_kept_waiting() -> None:
+    wall, kernel = Kernel(), Kernel()
+    seen: list[tuple[Ns, Ns]] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        loud, close = 20 * MS, 20 * MS - LEAD // 2
+        kernel.at(loud, seen_by(wall, kernel, seen))
+        for when in (17 * MS, 18 * MS, close):
+            kernel.at_leisure(when, seen_by(wall, kernel, seen))
+        host = RealHost(kernel, loop)
+        await asyncio.sleep(1)
+        host.close()
+        # The last one cannot run any earlier.
+        early = loud - LEAD
+        assert seen == [(17 * MS, early), (18 * MS, early), (close, close), (loud, loud)]
+
+    beside(wall, main)
+
+
+def test_quiet_events_that_are_due_have_run_before_anything_that_comes_in() -> None:
+    kernel = Kernel()
+    seen: list[str] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        kernel.at_leisure(10 * MS, seen.append, "quiet")
+        kernel.at_leisure(13 * MS, seen.append, "not yet due")
+        host = RealHost(kernel, loop)
+        await asyncio.sleep(0.012)
+        assert seen == []
+        host.arrive(seen.append, "arrival")
+        host.close()
+
+    beside(Kernel(), main)
+    assert seen == ["quiet", "arrival"]
+
+
+def test_lateness_and_spare_time_are_of_events_that_are_not_quiet() -> None:
+    wall, kernel = Kernel(), Kernel()
+    told: list[Ns] = []
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(kernel, loop)
+        host.late_watcher = told.append
+        host.arrive(kernel.at_leisure, 10 * MS, lambda: None)
+        assert host.spare() == inf
+        host.arrive(kernel.at, 60 * MS, lambda: None)
+        assert host.spare() == pytest.approx(0.06)
+        wall.run_until(50 * MS)  # as if the process had been away
+        await asyncio.sleep(1)
+        host.close()
+        assert kernel.ran == 2
+        assert host.lateness.count == 1
+        assert host.lateness.worst < US
+
+    beside(wall, main)
+    assert told == []
+
+
+def busy_bench() -> Bench:
+    """Ten nodes that are told to move, and to stop, all the time; many motions are short."""
+    bench = Bench(*range(10, 20))
+    for number in range(40):
+        line = ("m21v300a5d5", "m-7v60", "S", "m400v200a2d2", "m1v300", "m-1")[number % 6]
+        send, data = bench.bus.medium.transmit, packet(line, 10 + number % 10)
+        bench.kernel.at(number * 17 * MS, send, bench.port, data, 0)
+    return bench
+
+
+@pytest.mark.parametrize("away", [0, 3 * MS, 40 * MS])
+def test_a_bus_in_real_time_comes_to_what_it_comes_to_in_virtual_time(away: Ns) -> None:
+    wall, real, virtual = Kernel(), busy_bench(), busy_bench()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        host = RealHost(real.kernel, loop)
+        for _ in range(100):
+            await asyncio.sleep(0.03)
+            wall.run_until(wall.now + away)  # as if the process had been away
+        host.close()
+
+    beside(wall, main)
+    assert len(real.answers) == 40
+    for bench in (real, virtual):
+        bench.kernel.run_until(10 * SECOND)
+    assert real.transcript() == virtual.transcript()
+
+
+def test_whoever_looks_at_nodes_sees_them_as_they_are_though_their_events_wait() -> None:
+    real, virtual = busy_bench(), busy_bench()
+    waited = 0
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        nonlocal waited
+        host = RealHost(real.kernel, loop)
+        for _ in range(1_000):
+            await asyncio.sleep(0.000_7)
+            due = real.kernel.next_at()
+            waited += due is not None and due + US < host.bus_now()
+            host.arrive(lambda: None)
+            virtual.kernel.run_until(real.kernel.now)
+            assert real.transcript() == virtual.transcript()
+        host.close()
+
+    beside(Kernel(), main)
+    assert waited > 5
 
 
 # ---- lateness -----------------------------------------------------------------------------------
@@ -321,6 +483,22 @@ def test_without_pace_motion_still_keeps_the_time_of_the_clock() -> None:
 
     beside(Kernel(), main)
     assert states == ["ACCEL", "DECEL", "STANDBY"]
+
+
+def test_without_pace_what_stands_already_comes_as_much_earlier_as_the_line_ran_ahead() -> None:
+    bench = Bench()
+
+    async def main(loop: asyncio.AbstractEventLoop) -> None:
+        bench.kernel.at(SECOND, lambda: None)
+        host = RealHost(bench.kernel, loop, line_free_at=lambda: bench.bus.medium.free_at(0))
+        host.arrive(bench.port.talk, packet("v100"))
+        assert bench.kernel.now > 3 * MS
+        await asyncio.sleep(1)
+        assert host.lateness.count == 1
+        assert host.lateness.worst < US
+        host.close()
+
+    beside(Kernel(), main)
 
 
 # ---- virtual ------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Literal, NamedTuple
 
 import pytest
 from hypothesis import given
@@ -193,6 +194,156 @@ def test_whatever_is_scheduled_runs_by_time_and_then_by_order(
     assert clocks == sorted(clocks)
 
 
+# ---- quiet events -------------------------------------------------------------------------------
+
+
+def test_quiet_events_and_others_of_one_instant_run_in_the_order_of_their_scheduling() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+    for number in range(50):
+        make = kernel.at_leisure if number % 3 else kernel.at
+        make(5, ran.append, number)
+    kernel.run()
+    assert ran == list(range(50))
+
+
+def test_it_can_be_asked_when_the_next_event_is_due_that_is_not_quiet() -> None:
+    kernel = Kernel()
+    assert kernel.next_loud_at() is None
+    kernel.at_leisure(10, lambda: None)
+    assert (kernel.next_at(), kernel.next_loud_at()) == (10, None)
+    kernel.at(30, lambda: None)
+    kernel.at_leisure(40, lambda: None)
+    assert (kernel.next_at(), kernel.next_loud_at()) == (10, 30)
+    kernel.run_until(20)
+    assert (kernel.next_at(), kernel.next_loud_at()) == (30, 30)
+    kernel.run_until(30)
+    assert (kernel.next_at(), kernel.next_loud_at()) == (40, None)
+
+
+def test_a_quiet_event_whose_time_has_passed_runs_now() -> None:
+    kernel = Kernel(start=100)
+    seen: list[int] = []
+    kernel.at_leisure(20, lambda: seen.append(kernel.now))
+    assert kernel.run_until(100) == 1
+    assert seen == [100]
+
+
+def test_cancelled_appointments_of_both_kinds_are_passed_over_and_do_not_pile_up() -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+    for make, kept in ((kernel.at, 50), (kernel.at_leisure, 40)):
+        kernel.cancel(make(10, ran.append, "cancelled"))
+        make(kept, ran.append, make.__name__)
+    assert (kernel.next_at(), kernel.next_loud_at()) == (40, 50)
+    for number in range(10_000):
+        make = kernel.at_leisure if number % 2 else kernel.at
+        kernel.cancel(make(10 * SECOND + number, ran.append, "cancelled"))
+    assert len(kernel._loud) + len(kernel._quiet) < 200
+    assert kernel.run() == 2
+    assert ran == ["at_leisure", "at"]
+
+
+def test_a_quiet_event_that_is_hastened_is_quiet_no_more_and_keeps_its_place() -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+    kernel.at(10, ran.append, "before")
+    quiet = kernel.at_leisure(10, ran.append, "hastened")
+    kernel.at(10, ran.append, "behind")
+    kernel.hasten(quiet)
+    kernel.hasten(quiet)
+    assert kernel.run_until(9) == 0
+    assert kernel.next_loud_at() == 10
+    assert kernel.run_until(10) == 3
+    assert ran == ["before", "hastened", "behind"]
+    assert kernel.next_at() is None
+
+
+def test_what_was_hastened_can_be_cancelled_and_leaves_nothing_behind() -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+    for _ in range(1_000):
+        hastened = kernel.at_leisure(10, ran.append, "never")
+        kernel.hasten(hastened)
+        kernel.cancel(hastened)
+    assert len(kernel._loud) + len(kernel._quiet) < 200
+    kept = kernel.at_leisure(20, ran.append, "kept")
+    kernel.hasten(kept)
+    for number in range(1_000):
+        kernel.cancel(kernel.at_leisure(30 + number, ran.append, "never"))
+    assert kernel.next_at() == kernel.next_loud_at() == 20
+    assert kernel.run() == 1
+    assert (ran, kernel._cancelled) == (["kept"], 0)
+
+
+def test_hastening_what_is_not_quiet_or_not_there_any_more_changes_nothing() -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+    done, gone = (kernel.at_leisure(10, ran.append, "quiet") for _ in range(2))
+    loud = kernel.at(20, ran.append, "loud")
+    kernel.cancel(gone)
+    kernel.run_until(10)
+    for one in (done, gone, loud):
+        kernel.hasten(one)
+    assert kernel.run() == 1
+    assert ran == ["quiet", "loud"]
+
+
+class Making(NamedTuple):
+    """An appointment so much later, and what becomes of it; it makes the next at its time."""
+
+    wait: int
+    quiet: bool
+    fate: Literal["runs", "is cancelled", "is hastened"]
+    more: int
+
+
+makings = st.builds(
+    Making,
+    st.integers(0, 20),
+    st.booleans(),
+    st.sampled_from(("runs", "runs", "is cancelled", "is hastened")),
+    st.integers(0, 2),
+)
+
+
+@pytest.mark.slow
+@given(st.lists(makings, max_size=30), st.lists(st.integers(0, 80)))
+def test_any_mix_of_quiet_events_and_others_runs_in_the_order_of_one_heap(
+    plan: list[Making], stops: list[int]
+) -> None:
+    def play(*, all_loud: bool) -> list[tuple[int, int]]:
+        kernel = Kernel()
+        left = list(reversed(plan))
+        ran: list[tuple[int, int]] = []
+
+        def happen(number: int, more: int) -> None:
+            ran.append((kernel.now, number))
+            for _ in range(more):
+                make()
+
+        def make() -> None:
+            if not left:
+                return
+            wait, quiet, fate, more = left.pop()
+            choose = kernel.at_leisure if quiet and not all_loud else kernel.at
+            appointment = choose(kernel.now + wait, happen, len(left), more)
+            if fate == "is cancelled":
+                kernel.cancel(appointment)
+            elif fate == "is hastened":
+                kernel.hasten(appointment)
+
+        for _ in range(10):
+            make()
+        for stop in stops:
+            kernel.run_until(stop)
+            ran.append((kernel.now, kernel.next_at() or -1))
+        kernel.run()
+        return ran
+
+    assert play(all_loud=False) == play(all_loud=True)
+
+
 def test_units_are_nanoseconds() -> None:
     assert (US, MS, SECOND) == (10**3, 10**6, 10**9)
 
@@ -202,7 +353,7 @@ def test_cancelled_appointments_do_not_pile_up() -> None:
     kept = kernel.at(SECOND, lambda: None)
     for number in range(10_000):
         kernel.cancel(kernel.at(10 * SECOND + number, lambda: None))
-    assert len(kernel._heap) < 200
+    assert len(kernel._loud) < 200
     assert kernel.next_at() == SECOND
     assert kernel.run() == 1
     kernel.cancel(kept)

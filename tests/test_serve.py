@@ -215,7 +215,8 @@ def test_reports_are_json_lines_and_give_line_and_column() -> None:
 
 
 def test_a_process_that_was_held_up_says_so_and_by_how_much() -> None:
-    with served("--ephemeral") as sacbus:
+    # Soft ops: that the motion ends is told on the line, so it has to be punctual.
+    with served("--ephemeral", "--set", "soft_ops=true") as sacbus:
         exchange(sacbus.link, encode(10, 1, b"m100v120a999d999"), ACK_10)
         sacbus.process.send_signal(signal.SIGSTOP)
         # Until after the end of the motion, 0.25 s: then it is due.

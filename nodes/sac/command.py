@@ -143,8 +143,8 @@ class CommandProcessor:
         return self._run.gap
 
     @property
-    def soft_ops(self) -> bool:
-        """Whether the starts and ends of commands are told."""
+    def tells_ops(self) -> bool:
+        """Whether anybody is told of the starts and ends of commands."""
         return self._run.tells_ops
 
     @property

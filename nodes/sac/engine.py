@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from sacbus.kernel import Ns
-from sacbus.motion import Entry, Profile, Slip, State, Timebase, lost, slips
+from sacbus.motion import TICKS_PER_US, Entry, Profile, Slip, State, Timebase, lost, slips
 
 __all__ = ["Engine", "Where"]
 
@@ -63,7 +63,6 @@ class Engine:
         "_anchor",
         "_entry",
         "_left",
-        "_oscillator",
         "_profile",
         "_rest",
         "_sign",
@@ -71,11 +70,13 @@ class Engine:
         "_tick",
         "clock",
         "end",
+        "oscillator",
         "started",
     )
 
     def __init__(self, oscillator: Timebase = NOMINAL, external: Timebase | None = None) -> None:
-        self._oscillator = oscillator
+        #: The node's own clock.
+        self.oscillator = oscillator
         #: What pulses are timed by. :meth:`set_clock` changes it.
         self.clock = external or oscillator
         #: Where the present profile's pulse 0 goes on from.
@@ -107,7 +108,7 @@ class Engine:
 
     def processing(self, ticks: int) -> Ns:
         """What the node takes for something that its own oscillator times, whatever the clock."""
-        return self._oscillator.span(ticks)
+        return self.oscillator.span(ticks)
 
     def start(self, profile: Profile, at: Ns, wait: int = 0) -> None:
         """Run a profile ``wait`` ticks after ``at``.
@@ -209,6 +210,20 @@ class Engine:
         if self._profile is None or not self.begun(now):
             return self._rest.pulses
         return self._rest.pulses + self._sign * self._profile.pulses_at(self._ticks(now))
+
+    def clk(self, now: Ns) -> int:
+        """The level of the clk pin: 1 from each pulse of a command on, for the pulse's width.
+
+        Single pulses, which are of no command, are not shown.
+        """
+        profile = self._profile
+        if profile is None or not self.begun(now):
+            return 0
+        ticks = self._ticks(now)
+        pulse = profile.pulses_at(ticks) - 1
+        following = profile.time_of(pulse + 1)
+        falls = profile.time_of(pulse) + profile.drive.pulse_us * TICKS_PER_US
+        return int(ticks < min(falls, following - 1))
 
     def rpm(self, now: Ns) -> float:
         """Velocity of the pulses at ``now`` in RPM, signed, clockwise positive."""

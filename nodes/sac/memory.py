@@ -5,7 +5,7 @@ bear the names of ``sacbus.language.Parameter`` in lower case; factory values an
 alone. The saved queue is stored as rows of the companion's CSV, so that people can read it.
 
 Two parameters have a factory value of the place where the node is put: ``d_id`` is the configured
-address, and the rate of the port that is on the line is the line's own (decisions).
+address, and the rate of the software port, which is on the line, is the line's own (decisions).
 Source: manual, "Configure", "EEPROM", "ustep", "Queue".
 """
 
@@ -20,7 +20,7 @@ from sacbus.language import QUEUE_LENGTH, Defaults, Motion, Parameter
 from sacbus.language.queue_file import QueueRow, WrongRow, read_rows
 from sacbus.motion import Drive, PullOut
 
-__all__ = ["BAUD", "PINS", "QUEUE", "Memory", "name_of", "port_on_line"]
+__all__ = ["BAUD", "PINS", "QUEUE", "Memory", "name_of"]
 
 #: The rate of a line at which a SAC as it left the factory is understood.
 BAUD: Final = Parameter.SW.factory
@@ -40,8 +40,6 @@ _OWN_PINS: Final = tuple(range(Parameter.USTEP.largest + 1))
 #: What versions before the queue was saved called OVERRIDE, the other way round; never but 1.
 _FORMER: Final = "full_step"
 
-_RATES: Final = (Parameter.HW, Parameter.SW)
-
 #: One for all nodes that are alike: what is worked out for one then serves them all.
 _drive = lru_cache(maxsize=256)(Drive)
 _defaults = lru_cache(maxsize=256)(Defaults)
@@ -53,11 +51,6 @@ def name_of(parameter: Parameter) -> str:
 
 
 _BY_NAME: Final = {name_of(parameter): parameter for parameter in Parameter}
-
-
-def port_on_line(network: int) -> Parameter:
-    """The rate that counts on the line: the software port's, or with ``network`` the hardware's."""
-    return Parameter.HW if network else Parameter.SW
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,19 +105,12 @@ class Memory:
         return {parameter: self.value(parameter) for parameter in Parameter}
 
     def factory(self, parameter: Parameter) -> int:
-        """What a port's rate is before anybody sets it, here; any other's factory value."""
-        return self.line if parameter is port_on_line(self.network) else parameter.factory
+        """The factory value; of the port on the line the line's rate, as long as nobody sets it."""
+        return self.line if parameter is Parameter.SW else parameter.factory
 
     def with_values(self, values: Mapping[Parameter, int]) -> Memory:
-        """With parameters set; each value must be one that its parameter takes.
-
-        When the ports change places, a rate that nobody has set is the new place's.
-        """
-        after = _set(self, values)
-        if after.network == self.network:
-            return after
-        unset = (port for port in _RATES if self.value(port) == self.factory(port))
-        return _set(after, {**{port: after.factory(port) for port in unset}, **values})
+        """With parameters set; each value must be one that its parameter takes."""
+        return _set(self, values)
 
     def with_pins(self, exponent: int, levels: int) -> Memory:
         """With one entry of driver 2's pin map set; both 0 to 7."""
@@ -137,11 +123,6 @@ class Memory:
         return replace(self, queue=tuple(rows))
 
     # ---- what it means to the node ----
-
-    @property
-    def rate(self) -> int:
-        """Baud of the port that is on the line."""
-        return self.value(port_on_line(self.network))
 
     @property
     def clockwise(self) -> bool:
@@ -199,13 +180,13 @@ class Memory:
     def stored(self) -> dict[str, object]:
         """All of it by name, JSON values, for the EEPROM's file.
 
-        A port's rate is left out as long as nobody has set it, so that a node may be put on a line
+        The rate on the line is left out until somebody sets it, so that a node may be put on a line
         of another rate.
         """
         memory: dict[str, object] = {
             name: self.value(parameter)
             for name, parameter in _BY_NAME.items()
-            if parameter not in _RATES or self.value(parameter) != self.factory(parameter)
+            if parameter is not Parameter.SW or self.value(parameter) != self.factory(parameter)
         }
         memory[PINS] = list(self.pins)
         if self.queue is not None:

@@ -170,7 +170,7 @@ class MessageProcessor:
     def _answer(self, query: Query) -> None:
         """It prints on the terminal alone (spec, "Two ports"); the network hears nothing."""
         terminal = self.terminal
-        if terminal is None or terminal.show is None:
+        if terminal is None or not self._board.watched:
             self._ignored("a query is answered on the terminal only, and nobody is there")
         else:
             terminal.answer(query)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
-from nodes.sac.memory import Memory, name_of, port_on_line
+from nodes.sac.memory import Memory
 from nodes.sac.robust import RobustReceiver
 from nodes.sac.settings import SacSettings
 from sacbus.kernel import LineRate, Ns
@@ -27,17 +27,19 @@ from sacbus.wire import (
     encode,
     nak,
 )
-from sacbus.wire.times import ANSWER_BYTES, deaf_time, turnaround
+from sacbus.wire.times import (
+    ANSWER_BYTES,
+    ENABLE_LEAD_UNCHECKED,
+    deaf_time,
+    enable_lead,
+    turnaround,
+)
 
 __all__ = ["NetworkPort", "PortOwner"]
 
 #: For a message of its own the driver is enabled this long before the first bit (measured 5-11 us).
 ENABLE_LEAD: Final[Ns] = 8_000
 
-
-#: Per cent that two rates may differ: a receiver that samples in the middle of the last bit of ten
-#: is wrong beyond 5 %, and half of that is what data sheets leave to each side.
-TOLERANCE: Final = 2.5
 
 #: Deaf until this is deaf for good.
 _FOR_EVER: Final[Ns] = 2**63
@@ -49,6 +51,7 @@ _GARBLED: Final = bytes((byte ^ 0x55) | 0x80 for byte in range(256))
 _SIZES: Final = range(MAX_BODY + 1)
 _AFTER_NUL: Final = [turnaround(size, nul_follows=True) for size in _SIZES]
 _AFTER_TRIGGER: Final = [turnaround(size, nul_follows=False) for size in _SIZES]
+_ENABLED_BEFORE: Final = [enable_lead(size) for size in _SIZES]
 _DEAF_AFTER_ANSWER: Final = [deaf_time(size, answered=True) for size in _SIZES]
 _DEAF_AFTER_BROADCAST: Final = [deaf_time(size, answered=False) for size in _SIZES]
 
@@ -77,6 +80,8 @@ class NetworkPort:
         "_answer_span",
         "_deaf",
         "_deaf_until",
+        "_enable_lead",
+        "_enabled_until",
         "_garbles",
         "_outbox",
         "_owner",
@@ -116,6 +121,9 @@ class NetworkPort:
         #: Packets of its own, each with the earliest time for it.
         self._outbox: list[tuple[Ns, bytes]] = []
         self._sent_until: Ns = 0
+        #: How long before its answer the driver is enabled, and until when it is after a message.
+        self._enable_lead: Ns = 0
+        self._enabled_until: Ns = 0
         self._deaf_until: Ns = 0
         #: Whether it is set to another rate than the line's.
         self._garbles = False
@@ -129,23 +137,20 @@ class NetworkPort:
         #: When something is to be sent next; None when nothing is.
         self.due: Ns | None = None
 
-    def set_up(self, memory: Memory) -> None:
-        """Take address, rate and switches from memory, as at a boot.
+    def set_up(self, memory: Memory, rate: LineRate, *, garbles: bool = False) -> None:
+        """Take address and switches from memory, as at a boot; ``rate`` is that of its line.
 
-        An answer that waits still goes out as it is: that of ``$R`` itself.
+        ``garbles``: it is set to another rate than its line's. An answer that waits still goes out
+        as it is: that of ``$R`` itself.
         """
         self.ack = bool(memory.ack)
         self.crc = bool(memory.crc)
         self.address = self._receiver.address = memory.d_id
-        baud = self._rate.baud
-        self._garbles = abs(memory.rate - baud) * 100 > TOLERANCE * baud
-        if self._garbles:
+        self._rate = rate
+        self._answer_span = rate.span(ANSWER_BYTES)
+        self._garbles = garbles
+        if garbles:
             self._deaf_until = _FOR_EVER
-            self._owner.tell(
-                ReportKind.WARNING,
-                f"{name_of(port_on_line(memory.network))} is {memory.rate} baud, the line runs at "
-                f"{baud}: it hears nothing, and nobody understands it",
-            )
         elif self._deaf_until == _FOR_EVER:
             self._deaf_until = 0
 
@@ -215,8 +220,15 @@ class NetworkPort:
         else:
             data = self._outbox.pop(0)[1]
         self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
+        self._enabled_until = self._sent_until
         self._see_what_is_due()
         return data
+
+    def sends(self, now: Ns) -> int:
+        """The level of the tx_en pin: 1 while the driver is enabled, from before the first bit."""
+        lead = self._enable_lead if self._answer is not None else ENABLE_LEAD
+        waits = self.due is not None and now >= self.due - lead
+        return int(waits or now < self._enabled_until)
 
     def _busy_until(self) -> Ns:
         """When the answer that waits, or is on its way, is out, and a packet may follow."""
@@ -254,6 +266,8 @@ class NetworkPort:
                     ReportKind.LOST, "an answer that had not begun when the next was due"
                 )
             self._answer = (nak if wrong else ack)(packet.src, self.address)
+            unchecked = packet.verdict is Verdict.UNCHECKED
+            self._enable_lead = ENABLE_LEAD_UNCHECKED if unchecked else _ENABLED_BEFORE[size]
         self._answer_at = replies
         if self._turnaround and not self._robust and (answered if wrong else not run):
             self._waits_for = (limit, size)

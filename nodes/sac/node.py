@@ -14,7 +14,8 @@ from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
 from nodes.sac.network import NetworkPort
-from nodes.sac.pins import Outputs, outputs
+from nodes.sac.pins import SacPins
+from nodes.sac.ports import Exchanged, HardwarePort, understand
 from nodes.sac.queries import Query, answer
 from nodes.sac.screens import Flags
 from nodes.sac.settings import SacSettings
@@ -22,7 +23,7 @@ from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import LineRate, Ns
 from sacbus.language import Session, Stop
 from sacbus.motion import Drive, Timebase
-from sacbus.node import Heard, Report, ReportKind, Snapshot
+from sacbus.node import BOOT, Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
 __all__ = ["SacNode"]
@@ -40,21 +41,24 @@ class SacNode:
         "_commands",
         "_configured",
         "_engine",
+        "_exchanged",
+        "_hardware",
         "_memory",
         "_messages",
-        "_microstep_pins",
         "_network",
         "_now",
+        "_pins",
         "_rate",
         "_settings",
         "_start",
         "_tell_bus",
         "_terminal",
-        "_xclk_hz",
         "eeprom",
         "memory_changed",
-        "rst",
+        "microstep_pins",
+        "soft_ops",
         "throttles",
+        "xclk_hz",
     )
 
     def __init__(
@@ -65,11 +69,14 @@ class SacNode:
         self._rate = rate
         self._tell_bus = tell
         self._now: Ns = 0
+        #: Both made when they are first asked for: most nodes never have a user there.
         self._terminal: TerminalPort | None = None
+        self._hardware: HardwarePort | None = None
+        #: While the two ports have each other's role.
+        self._exchanged: Exchanged | None = None
         #: Frequency of the clock at the xclk pin.
-        self._xclk_hz = settings.xclk_hz
-        #: Level of the RST pin; while it is 0, a cold boot restores the factory's memory.
-        self.rst = 1
+        self.xclk_hz = settings.xclk_hz
+        self._pins: SacPins | None = None
         #: Called each time the contents of the EEPROM have changed.
         self.memory_changed: Callable[[], None] | None = None
         #: What the EEPROM holds; what the node obeys is what it held at the last boot.
@@ -90,11 +97,13 @@ class SacNode:
         )
         if memory.queue is not None:
             self._commands.queue.load(memory.queue)
+        if self._pins is not None and not self._pins.estop:
+            self._commands.bar(barred=True, now=now)
         self._network = NetworkPort(self._settings, self._rate, self)
         self._messages = MessageProcessor(self._commands, self, self._terminal)
         #: Levels of MS3 MS2 MS1, bits 2 to 0: low until a driver's table says otherwise.
-        self._microstep_pins = 0
-        self._network.set_up(memory)
+        self.microstep_pins = 0
+        self._set_up_ports()
         self._reset_session()
         if cold:
             self._network.listen_from(now + LISTENS)
@@ -112,18 +121,32 @@ class SacNode:
     @property
     def receiving(self) -> bool:
         """True while its receiver stands open."""
-        return self._network.receiving
+        return self._network.receiving or self._exchanged is not None
+
+    @property
+    def quiet(self) -> bool:
+        """True while it has nothing to send, and nobody is to be told of starts and ends."""
+        return self._network.due is None and not self._commands.tells_ops and self._start is None
 
     def hear(self, heard: Heard, now: Ns) -> None:
         """Bytes from the line."""
         self._now = now
-        self._network.hear(heard)
+        if self._exchanged is None:
+            self._network.hear(heard)
+        else:
+            self.terminal_keys(self._exchanged.keys(heard), now)
+        if self._pins is not None:
+            self._pins.look(now)
 
     def wake_at(self) -> Ns | None:
         """The next answer or packet to send, the end of the command that runs, or of a boot."""
         if self._start is not None:
             return self._start.over
         sends = self._network.due
+        if self._exchanged is not None:
+            says = self._exchanged.due
+            if says is not None and (sends is None or says < sends):
+                sends = says
         ends = self._commands.due
         if sends is None:
             return ends
@@ -135,12 +158,19 @@ class SacNode:
         if self._start is not None:
             self._end_boot(self._start, now)
         self._commands.wake(now)
-        return self._network.wake(now)
+        if self._pins is not None:
+            self._pins.look(now)
+        data = self._network.wake(now)
+        if self._exchanged is None:
+            return data
+        if data and self._hardware is not None and self._hardware.show is not None:
+            self._hardware.show(data)
+        return self._exchanged.say(now)
 
     def state(self, now: Ns) -> str:
-        """What the engine does; SYNC while a command is held that has not begun; OFF."""
-        if self._start is OFF:
-            return "OFF"
+        """What the engine does; SYNC while a command is held that has not begun; OFF; BOOT."""
+        if self._start is not None:
+            return "OFF" if self._start is OFF else BOOT
         return "SYNC" if self._commands.held is not None else self._engine.state(now).name
 
     def snapshot(self, now: Ns) -> Snapshot:
@@ -211,6 +241,8 @@ class SacNode:
             self._commands.execute(Stop(grace=False), now)
             self._network.listen_from(None)
             self._start = OFF
+        if self._pins is not None:
+            self._pins.look(now)
 
     def reboot(self, now: Ns) -> None:
         """The warm boot of ``$R``: parameters anew from EEPROM; queue and motor stay.
@@ -223,10 +255,9 @@ class SacNode:
         self._commands.reboot(Session.start(memory.defaults()), self._drive(), now)
         self._commands.set_clock(self._external_clock() or self._settings.oscillator, now)
         self._engine.change_microsteps(before.ustep, memory.ustep)
-        self._network.set_up(memory)
+        self._set_up_ports()
         self._reset_session()
-        if self._terminal is not None:
-            self._terminal.restart()
+        self._show_prompt()
         self._start = Start(now)
 
     def _reset_session(self) -> None:
@@ -234,10 +265,10 @@ class SacNode:
         memory = self._memory
         #: Whether the encoder turns the speed of continuous motion (EnT), or steps the motor (EnF).
         self.throttles = False
-        self._commands.switch_ops(on=bool(memory.soft_ops))
+        self.send_soft_ops(on=bool(memory.soft_ops))
         pins = memory.microstep_pins
         if pins is not None:
-            self._microstep_pins = pins
+            self.microstep_pins = pins
         else:
             self.tell(
                 ReportKind.WARNING,
@@ -248,14 +279,19 @@ class SacNode:
     def _end_boot(self, start: Start, now: Ns) -> None:
         if start.over is None or start.over > now:
             return
-        if start.restores or (start.listens and not self.rst):
+        reset = self._pins is not None and not self._pins.rst
+        if start.restores or (start.listens and reset):
             self.write(self._factory_memory())
             self._boot(now, cold=False)
         self._start = None
-        if start.listens and self._terminal is not None:
-            self._terminal.restart()
+        if start.listens:
+            self._show_prompt()
         if self._memory.autorun:
             self._commands.autorun(self._memory.autorun, now)
+
+    def _show_prompt(self) -> None:
+        if self._terminal is not None:
+            self._terminal.restart()
 
     def _drive(self) -> Drive:
         settings = self._settings
@@ -277,28 +313,89 @@ class SacNode:
         """Its network port."""
         return self._network
 
-    def pins(self, now: Ns) -> Outputs:
-        """Levels of its output pins at ``now``."""
-        return outputs(self._memory, self._engine, self._microstep_pins, now)
-
-    # ---- the terminal ----
+    @property
+    def engine(self) -> Engine:
+        """Its motion engine."""
+        return self._engine
 
     @property
-    def terminal(self) -> TerminalPort:
-        """Its terminal port, made when it is first asked for: most nodes never have a user."""
+    def obeyed(self) -> Memory:
+        """The memory that it booted with."""
+        return self._memory
+
+    @property
+    def booted(self) -> bool:
+        """Whether it runs: switched on, and its boot is over."""
+        return self._start is None
+
+    # ---- the ports ----
+
+    def _set_up_ports(self) -> None:
+        """Give the two ports their roles and rates."""
+        memory, line = self._memory, self._rate
+        hears = understand(memory.sw, line.baud)
+        if not hears:
+            self.tell(
+                ReportKind.WARNING,
+                f"sw is {memory.sw} baud, the line runs at {line.baud}: it hears nothing, and "
+                "nobody understands it",
+            )
+        if memory.network:
+            rate = LineRate(memory.hw, line.bits)
+            self._network.set_up(memory, rate)
+            self._exchanged = Exchanged(self._network, rate, line, hears=hears)
+        else:
+            self._network.set_up(memory, line, garbles=not hears)
+            self._exchanged = None
+
+    @property
+    def terminal(self) -> HardwarePort:
+        """Its hardware port, where its terminal is (``ports.py``)."""
+        if self._hardware is None:
+            self._hardware = HardwarePort(self)
+            self._terminal_port()
+        return self._hardware
+
+    def hardware_keys(self, keys: bytes, now: Ns) -> None:
+        """Bytes arrive at the hardware port."""
+        if self._exchanged is None:
+            self.terminal_keys(keys, now)
+            return
+        self._now = now
+        self._exchanged.hear(keys, now)
+        if self._pins is not None:
+            self._pins.look(now)
+
+    def terminal_keys(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive at the terminal, on whichever port; a boot under way takes them all."""
+        self._now = now
+        if keys and (self._start is None or not self._start.key()):
+            self._terminal_port().take(keys, now)
+        if self._pins is not None:
+            self._pins.look(now)
+
+    def show(self, text: bytes) -> None:
+        """What the terminal prints."""
+        if self._exchanged is not None:
+            self._exchanged.print(text)
+        elif self._hardware is not None and self._hardware.show is not None:
+            self._hardware.show(text)
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody is at the far end of the terminal."""
+        if self._exchanged is not None:
+            return self._exchanged.hears
+        return self._hardware is not None and self._hardware.show is not None
+
+    def _terminal_port(self) -> TerminalPort:
         if self._terminal is None:
             self._terminal = self._messages.terminal = TerminalPort(self)
         return self._terminal
 
-    def keys_typed(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive at the terminal port."""
-        self._now = now
-        if self._start is None or not self._start.key():
-            self.terminal.take(keys, now)
-
     def line_typed(self, line: bytes, now: Ns) -> None:
         """A line was typed at the terminal port."""
-        self._messages.terminal_line(line, self.terminal, now)
+        self._messages.terminal_line(line, self._terminal_port(), now)
 
     def answer(self, query: Query) -> list[str]:
         """What a query shows on the terminal."""
@@ -307,7 +404,7 @@ class SacNode:
             gap=commands.gap,
             debug=commands.debug,
             throttle=self.throttles,
-            soft_ops=commands.soft_ops,
+            soft_ops=self.soft_ops,
             ack=network.ack,
             crc=network.crc,
             source=self._messages.last_source,
@@ -316,6 +413,24 @@ class SacNode:
 
     # ---- pins ----
 
+    @property
+    def pins(self) -> SacPins:
+        """Its pins, made when they are first asked for: most nodes have nothing wired to them."""
+        if self._pins is None:
+            self._pins = SacPins(self)
+        return self._pins
+
+    def send_soft_ops(self, *, on: bool) -> None:
+        """Tell the network of the starts and ends of commands, or no longer."""
+        #: Whether they are told of over the network.
+        self.soft_ops = on
+        self.watch_ops()
+
+    def watch_ops(self) -> None:
+        """See anew whether anybody is to be told of starts and ends of commands."""
+        watched = self._pins is not None and self._pins.watched
+        self._commands.switch_ops(on=self.soft_ops or watched)
+
     def feed_xclk(self, hz: int, now: Ns) -> None:
         """From ``now`` on a clock of ``hz`` comes to the xclk pin; 0: no edges.
 
@@ -323,7 +438,7 @@ class SacNode:
         bus has the bus ask the node anew when it wants to be woken.
         """
         self._now = now
-        self._xclk_hz = hz
+        self.xclk_hz = hz
         clock = self._external_clock()
         if clock is not None:
             self._commands.set_clock(clock, now)
@@ -331,7 +446,7 @@ class SacNode:
     def _external_clock(self) -> Timebase | None:
         """What times pulses instead of the oscillator; None when nothing does."""
         memory = self._memory
-        return None if memory.clock else Timebase.external(memory.xfreq, self._xclk_hz)
+        return None if memory.clock else Timebase.external(memory.xfreq, self.xclk_hz)
 
     def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         """A packet was accepted."""
@@ -339,6 +454,8 @@ class SacNode:
 
     def tell_ops(self, *, start: bool, at: Ns) -> Ns:
         """Soft ops tell everybody that a command starts or ends; when that will be out."""
+        if not self.soft_ops:
+            return at  # the op pins alone are watched
         return self._network.send(GENERAL_CALL, bytes((DC1 if start else DC2,)), at)
 
     def tell_of_command(self, kind: ReportKind, text: str, command: str | None = None) -> None:

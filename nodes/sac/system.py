@@ -60,12 +60,21 @@ class Board(Protocol):
         ...
 
     @property
+    def watched(self) -> bool:
+        """Whether anybody is at the far end of its terminal."""
+        ...
+
+    @property
     def eeprom(self) -> Memory:
         """What its EEPROM holds now; obeyed after the next boot."""
         ...
 
     def write(self, memory: Memory) -> None:
         """Put this into the EEPROM."""
+        ...
+
+    def send_soft_ops(self, *, on: bool) -> None:
+        """Tell the network of the starts and ends of commands, or no longer."""
         ...
 
     def reboot(self, now: Ns) -> None:
@@ -114,7 +123,7 @@ def _obey_system(command: SystemCommand, board: Board, now: Ns) -> None:
         case ToggleEncoder():
             board.throttles = not board.throttles
         case SendSoftOps(on):
-            commands.switch_ops(on=on)
+            board.send_soft_ops(on=on)
         case Reboot():
             board.reboot(now)
         case Configure() | ShowMemory():

@@ -16,7 +16,7 @@ Source: manual, "Communications", "Queue", "Configure"; spec, "Two ports, two ma
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Final, Protocol
 
 from nodes.sac.queries import Query
@@ -40,8 +40,8 @@ _SIGNS: Final = b"+-"
 class TerminalOwner(Protocol):
     """The node behind the port."""
 
-    def keys_typed(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive; usually it hands them to :meth:`TerminalPort.take`."""
+    def show(self, text: bytes) -> None:
+        """Take what the port prints to wherever its far end is."""
         ...
 
     def line_typed(self, line: bytes, now: Ns) -> None:
@@ -54,7 +54,7 @@ class TerminalOwner(Protocol):
 
 
 class TerminalPort:
-    """A node's terminal, in the shape of ``sacbus.node.Terminal``."""
+    """A node's terminal, whichever of its ports that is on."""
 
     __slots__ = (
         "_after_cr",
@@ -65,13 +65,10 @@ class TerminalPort:
         "_owner",
         "_too_long",
         "mode",
-        "show",
     )
 
     def __init__(self, owner: TerminalOwner) -> None:
         self._owner = owner
-        #: Takes what the port prints, at once; None while nobody is connected: then it is lost.
-        self.show: Callable[[bytes], None] | None = None
         #: What a line may be.
         self.mode = Mode.PROMPT
         self._line = bytearray()
@@ -83,10 +80,6 @@ class TerminalPort:
         self._executing = False
         #: What is to be shown when the keys at hand have been taken; None: nothing is taken now.
         self._out: bytearray | None = None
-
-    def type(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive. The owner asks the bus to touch the node afterwards (``Bus.touch``)."""
-        self._owner.keys_typed(keys, now)
 
     def take(self, keys: bytes, now: Ns) -> None:
         """Take keys as a booted node does."""
@@ -167,5 +160,5 @@ class TerminalPort:
             self._at_line_start = data.endswith(_END)
         if self._out is not None:
             self._out += data
-        elif self.show is not None and data:
-            self.show(bytes(data))
+        elif data:
+            self._owner.show(bytes(data))

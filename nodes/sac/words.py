@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from nodes.sac.memory import Memory, name_of, port_on_line
+from nodes.sac.memory import Memory, name_of
 from sacbus.language import Parameter
 from sacbus.language.commands.quantities import fixed_text
 from sacbus.language.queue_file import QueueRow
@@ -62,7 +62,7 @@ def memory_words(stored: Mapping[str, object], address: int | None) -> MemoryWor
         at_factory = memory.factory(parameter) if at_factory is None else at_factory
         value = memory.value(parameter)
         differs = value != at_factory
-        if parameter is port_on_line(memory.network) and name_of(parameter) not in stored:
+        if parameter is Parameter.SW and name_of(parameter) not in stored:
             values.append(MemoryValue(parameter.letter, parameter.title, "-", "as the line", None))
             continue
         values.append(

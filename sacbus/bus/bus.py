@@ -174,21 +174,29 @@ class _Routes:
 
         One that stands for later is kept: usually the node will want it again (the end of its
         motion, after the answer that comes first). When it comes and does not count, nothing
-        happens; when too many stand, those that do not count are cancelled.
+        happens; when too many stand, those that do not count are cancelled. A node that is not
+        quiet gets one that is punctual.
         """
-        when = seat.node.wake_at()
-        if when is None or (seat.due is not None and when >= seat.due):
+        node = seat.node
+        when = node.wake_at()
+        if when is None:
             return
-        if when < self._kernel.now:
-            when = self._kernel.now
-        seat.due = when
-        standing = seat.standing
-        if when not in standing:
-            if len(standing) >= STANDING:
-                for appointment in standing.values():
-                    self._kernel.cancel(appointment)
-                standing.clear()
-            standing[when] = self._kernel.at(when, self._wake, seat, when)
+        kernel, standing = self._kernel, seat.standing
+        if seat.due is None or when < seat.due:
+            if when < kernel.now:
+                when = kernel.now
+            seat.due = when
+            if when not in standing:
+                if len(standing) >= STANDING:
+                    for appointment in standing.values():
+                        kernel.cancel(appointment)
+                    standing.clear()
+                make = kernel.at_leisure if node.quiet else kernel.at
+                standing[when] = make(when, self._wake, seat, when)
+                return
+        if not node.quiet:
+            # One that was made before may be quiet; what the node wants for later comes of it.
+            kernel.hasten(standing[seat.due])
 
     def _wake(self, seat: _Seat, when: Ns) -> None:
         del seat.standing[when]

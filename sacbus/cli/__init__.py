@@ -22,8 +22,10 @@ from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
 from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, verbose
 from sacbus.cli.plan import plan_command
+from sacbus.cli.queue import queue_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
+from sacbus.cli.terminal import terminal_command
 
 __all__ = ["main", "run"]
 
@@ -52,8 +54,10 @@ def root(context: click.Context) -> int | None:
 for command in (
     serve_command,
     send_command,
+    terminal_command,
     monitor_command,
     plan_command,
+    queue_command,
     check_command,
     eeprom_group,
     kinds_command,

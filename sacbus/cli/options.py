@@ -11,6 +11,7 @@ from sacbus.config.notation import NotationError, addresses, endpoint
 
 __all__ = [
     "INTERRUPTED",
+    "NO_ANSWER_STATUS",
     "USAGE_STATUS",
     "WrongInput",
     "baud",
@@ -23,9 +24,10 @@ __all__ = [
 _T = TypeVar("_T")
 _F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command has
 
-#: Exit statuses (spec, cli): after Ctrl-C, and for what was not understood.
+#: Exit statuses (spec, cli): after Ctrl-C, for what was not understood, and when nobody answers.
 INTERRUPTED: Final = 130
 USAGE_STATUS: Final = 2
+NO_ANSWER_STATUS: Final = 4
 
 
 class WrongInput(click.ClickException):

@@ -8,13 +8,12 @@ from typing import Final
 
 import click
 
-from sacbus.cli.options import baud, verbose
+from sacbus.cli.options import NO_ANSWER_STATUS, baud, verbose
 
 __all__ = ["send_command"]
 
 #: Exit statuses (spec, cli).
 NAK_STATUS: Final = 3
-NO_ANSWER_STATUS: Final = 4
 UNKNOWN_STATUS: Final = 5
 
 

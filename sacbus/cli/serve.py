@@ -72,6 +72,11 @@ __all__ = ["serve_command"]
     metavar="/dev/ttyUSB0",
     help="A real adapter: the nodes on its line and the virtual ones share the bus.",
 )
+@click.option(
+    "--terminals",
+    is_flag=True,
+    help="A pty for each node's terminal too: PATH-10 beside the first --pty PATH.",
+)
 @click.option("--rts", is_flag=True, help="Adapters switch their direction by RTS.")
 @click.option(
     "--baud",

@@ -15,7 +15,7 @@ from sacbus.config import lines
 from sacbus.config.draft import BusDraft, Draft
 from sacbus.config.mistake import Findings
 from sacbus.config.notation import endpoint_text, ranges
-from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt
+from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt, terminal_path
 
 __all__ = ["clashes"]
 
@@ -28,6 +28,7 @@ def clashes(draft: Draft, findings: Findings) -> None:
         _protocols(bus, findings)
     _memories(draft.buses, findings)
     _places(draft.buses, findings)
+    _terminals(draft.buses, findings)
     _real_time(draft, findings)
 
 
@@ -137,6 +138,31 @@ def _same(one: Place, other: Place) -> str | None:
             return "a port" if _overlap(one.host, other.host) else None
         case _:
             return None
+
+
+def _terminals(buses: list[BusDraft], findings: Findings) -> None:
+    """No link has the path of a node's terminal."""
+    taken: dict[str, tuple[int, BusDraft]] = {}
+    for bus in buses:
+        if bus.table.get("terminals") is True:
+            places = [link.place for link in bus.links if link.place is not None]
+            for address in (one for node in bus.nodes for one in node.addresses):
+                path = terminal_path(places, address)
+                if path is not None:
+                    taken.setdefault(os.path.normpath(path), (address, bus))
+    for link in (link for bus in buses for link in bus.links):
+        place = link.place
+        if not isinstance(place, PtyAt | AdapterAt) or place.path is None:
+            continue
+        holder = taken.get(os.path.normpath(place.path))
+        if holder is not None:
+            address, bus = holder
+            findings.add(
+                link.spot,
+                f"expected a path of its own, got {_spelled(place)!r}, where the terminal of node "
+                f"{address} is, {findings.place(bus.table.at('terminals'))}",
+                "change one of them",
+            )
 
 
 def _overlap(one: str, other: str) -> bool:

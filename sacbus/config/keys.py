@@ -200,6 +200,11 @@ BUS: Final = (
         "false: the line may run ahead of the clock; a real adapter needs true",
         default=True,
     ),
+    _flag(
+        "terminals",
+        "a pty for each node's terminal: PATH-10 beside the first link with a path",
+        default=False,
+    ),
     Key(
         "state",
         "a directory, or false to keep nothing",

@@ -29,7 +29,8 @@ def oddities(draft: Draft, findings: Findings) -> None:
 
 def _bus(bus: BusDraft, findings: Findings) -> None:
     if bus.table.lacks("links"):
-        findings.add(bus.table.path, "no program can reach this bus", "add [[bus.links]]")
+        if not (bus.table.get("terminals") and bus.nodes):
+            findings.add(bus.table.path, "no program can reach this bus", "add [[bus.links]]")
     elif bus.table.lacks("nodes") and len(bus.links) == 1:
         findings.add(bus.table.path, "there is nobody to talk to", "add [[bus.nodes]]")
     if bus.table.get("lanes") == 2:

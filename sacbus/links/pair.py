@@ -19,6 +19,11 @@ from .settings import LineSettings
 __all__ = ["PtyPair"]
 
 _CHUNK: Final = 65_536  # the most one read may bring; Linux gives 4 kB at a time
+_REMEDIES: Final = {
+    errno.EMFILE: "raise this user's limit of open files (ulimit -n), or open fewer links",
+    errno.ENFILE: "close programs that have many files open",
+    errno.ENOSPC: "close programs that use ptys, or raise the system's limit of them",
+}
 _SLAVE: Final = os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK | os.O_CLOEXEC
 
 
@@ -33,7 +38,7 @@ class PtyPair:
             self.master, slave = os.openpty()
         except OSError as error:
             what = f"no pty to be had ({error.strerror})"
-            remedy = "close programs that use some, or use another link"
+            remedy = _REMEDIES.get(error.errno or 0, "use another link")
             raise LinkError(what, "/dev/ptmx", remedy) from error
         self.path = os.ttyname(slave)
         self._baud = baud

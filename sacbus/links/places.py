@@ -5,11 +5,12 @@ Owns what can be said of a link before it exists; opens nothing.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-__all__ = ["AdapterAt", "Place", "PtyAt", "Rfc2217At", "TcpAt"]
+__all__ = ["AdapterAt", "Place", "PtyAt", "Rfc2217At", "TcpAt", "terminal_path"]
 
 #: A paced link starts to send no earlier than this after the line went idle (bus/port.py).
 LATENCY_US: Final = 1_000
@@ -62,3 +63,11 @@ class AdapterAt:
 
 
 Place = PtyAt | TcpAt | Rfc2217At | AdapterAt
+
+
+def terminal_path(places: Iterable[Place], address: int | str) -> Path | None:
+    """Where the terminal of a node is: beside the first pty that has a path, if one has."""
+    for place in places:
+        if isinstance(place, PtyAt) and place.path is not None:
+            return place.path.with_name(f"{place.path.name}-{address}")
+    return None

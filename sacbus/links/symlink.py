@@ -14,6 +14,7 @@ only while locked, so whoever has locked it must look whether it still bears its
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
 from pathlib import Path
@@ -52,7 +53,10 @@ class Symlink:
             ) from error
         except OSError as error:
             what = f"cannot make the symlink ({error.strerror})"
-            raise LinkError(what, str(self.path), "choose another path") from error
+            remedy = "choose another path"
+            if error.errno == errno.EMFILE:
+                remedy = "raise this user's limit of open files (ulimit -n), or open fewer links"
+            raise LinkError(what, str(self.path), remedy) from error
 
     def point(self, target: str) -> None:
         """Point the claimed path at `target`, in one step: it is never missing in between."""

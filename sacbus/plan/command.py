@@ -16,10 +16,10 @@ from typing import BinaryIO, Final
 
 import click
 
+from sacbus.fresh import fresh_file
 from sacbus.language import Defaults
 from sacbus.motion import Drive
 from sacbus.plan.entries import Commands, ListFile, PlanError, QueueFile, Source, Spool
-from sacbus.plan.fresh import fresh_file
 from sacbus.plan.pulses import PulseFormat, format_of, write_pulses
 from sacbus.plan.report import json_pieces, text_lines
 from sacbus.plan.sequence import Plan, Survey

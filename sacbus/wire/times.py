@@ -10,7 +10,14 @@ from __future__ import annotations
 
 from typing import Final
 
-__all__ = ["ANSWER_BYTES", "MOTHER_GAP", "deaf_time", "turnaround"]
+__all__ = [
+    "ANSWER_BYTES",
+    "ENABLE_LEAD_UNCHECKED",
+    "MOTHER_GAP",
+    "deaf_time",
+    "enable_lead",
+    "turnaround",
+]
 
 #: An ACK or NAK: STX, destination, source, 06 or 15.
 ANSWER_BYTES: Final = 4
@@ -29,6 +36,18 @@ _MEASURED_WITH: Final = 5
 #: After the answer (5 characters) and after a broadcast; 39 characters take 0.25 ms more.
 _DEAF_AFTER_ANSWER: Final = 310_000
 _DEAF_AFTER_BROADCAST: Final = 370_000
+
+#: How long before the first bit of an answer the driver is enabled: to a packet without CRC; to one
+#: with a CRC of 5 characters, and of 46 (measured).
+ENABLE_LEAD_UNCHECKED: Final = 287_000
+_ENABLE_LEAD: Final = 330_000
+_ENABLE_LEAD_OF_46: Final = 650_000
+
+
+def enable_lead(body: int) -> int:
+    """Ns from the enabling of the driver to the answer to a packet of ``body`` characters."""
+    slope = _ENABLE_LEAD_OF_46 - _ENABLE_LEAD
+    return _ENABLE_LEAD + max(0, body - _MEASURED_WITH) * slope // (46 - _MEASURED_WITH)
 
 
 def turnaround(body: int, *, nul_follows: bool) -> int:

@@ -9,8 +9,9 @@ from random import Random
 
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from nodes.sac import KIND, SacProtocol, SacSettings
+from nodes.sac import KIND, SacNode, SacProtocol, SacSettings
 from sacbus.bus import LATENCY, Bus, Port, Transmission
 from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from sacbus.node import Report, ReportKind
@@ -255,6 +256,94 @@ def test_the_same_inputs_give_the_same_transcript(talk: list[tuple[Ns, bytes]]) 
     assert run() == run()
 
 
+# ---- quiet appointments -------------------------------------------------------------------------
+
+
+def due(bench: Bench) -> tuple[Ns | None, Ns | None]:
+    """When the next event is due, and the next that is not quiet."""
+    return bench.kernel.next_at(), bench.kernel.next_loud_at()
+
+
+def test_an_answer_is_punctual_and_the_end_of_a_motion_is_quiet() -> None:
+    bench = Bench()
+    bench.port.close()
+    bench.hears(MOVE, at=20 * MS)
+    answer, end = bench.node._network.due, bench.node._commands.due
+    assert answer is not None
+    assert due(bench) == (answer, answer)
+    # The answer ends on the line, which is punctual as well.
+    bench.kernel.run_until(answer + bench.span(4))
+    assert due(bench) == (end, None)
+    bench.run()
+    assert bench.kernel.now == end
+    assert due(bench) == (None, None)
+
+
+def test_where_soft_ops_tell_of_it_the_end_of_a_motion_is_punctual() -> None:
+    bench = Bench(settings=SacSettings(soft_ops=True))
+    bench.hears(MOVE, at=20 * MS)
+    bench.kernel.run_until(SECOND)
+    end = bench.node._commands.due
+    assert due(bench) == (end, end)
+
+
+@pytest.mark.parametrize("apart", [-200 * US, -1, 0, 1, 300 * US])
+def test_an_appointment_that_was_quiet_is_punctual_once_the_node_has_something_to_send(
+    apart: Ns,
+) -> None:
+    """A packet comes shortly before a motion ends; its answer is due ``apart`` after that end."""
+    bench = Bench()
+    bench.hears(MOVE, at=20 * MS)
+    bench.kernel.run_until(SECOND)
+    end = bench.node._commands.due
+    assert end is not None
+    assert due(bench) == (end, None)
+    # 385 us for 5 characters, from the end of the NUL behind ETX (which `hears` does not send).
+    bench.sends(packet("v100"), at=end + apart - 385 * US - bench.span(len(packet("v100"))))
+    bench.kernel.run_until(end + apart - 350 * US)
+    answer = bench.node._network.due
+    assert answer == end + apart
+    assert bench.kernel.next_at() == min(end, answer)
+    # Were the end late, so would be what the node wants after it.
+    assert bench.kernel.next_loud_at() == min(end, answer)
+    bench.kernel.run_until(min(end, answer))
+    if answer > end:
+        assert due(bench) == (answer, answer)
+    elif answer < end:
+        assert due(bench) == (end, answer + bench.span(4))
+    bench.run()
+    assert bench.position(bench.kernel.now) == MOVED
+    assert bench.answers == [ack(MOTHER, NODE)] * 2
+
+
+class Punctual(SacNode):
+    """A SAC that has the process woken for whatever it does."""
+
+    __slots__ = ()
+
+    @property
+    def quiet(self) -> bool:
+        return False
+
+
+@pytest.mark.slow
+@settings(max_examples=100)
+@given(traffic(), st.booleans())
+def test_whether_nodes_are_quiet_makes_no_difference_to_what_happens(
+    talk: list[tuple[Ns, bytes]], soft_ops: bool
+) -> None:
+    some = SacSettings(soft_ops=soft_ops)
+    quiet, punctual = Bench(*ADDRESSES, settings=some), Bench()
+    punctual.bus = Bus(punctual.kernel, KIND.protocol)
+    punctual.nodes.clear()
+    for address in ADDRESSES:
+        node = Punctual(address, some, punctual.bus.rate, punctual.bus.tell)
+        punctual.bus.add(node)
+        punctual.nodes[address] = node
+    punctual.port = Port(punctual.bus.medium, punctual._take, latency=0)
+    assert play(quiet, talk) == play(punctual, talk)
+
+
 # ---- noise --------------------------------------------------------------------------------------
 
 NOISE = 1_000_000
@@ -391,4 +480,4 @@ def test_what_a_moving_node_hears_leaves_nothing_behind_in_the_kernel(lines: tup
         bench.hears(lines[number % len(lines)], at=(number + 2) * each)
         bench.kernel.run_until((number + 2) * each + each // 2)
     # What is cancelled is cleared away when it is more than half, and 64 at least.
-    assert len(bench.kernel._heap) < 80
+    assert len(bench.kernel._loud) + len(bench.kernel._quiet) < 80

@@ -107,6 +107,15 @@ def test_a_bus_that_nobody_can_use_is(tmp_path: Path) -> None:
     assert warnings(tmp_path, both) == []
 
 
+def test_terminals_are_a_way_to_nodes_if_there_are_some(tmp_path: Path) -> None:
+    text = "[[bus]]\nterminals = true\n"
+    assert warnings(tmp_path, text) == [
+        "bus 'bus': no program can reach this bus, line 1, add [[bus.links]]"
+    ]
+    assert warnings(tmp_path, f"{text}nodes = [{{address = 10}}]\n") == []
+    assert len(warnings(tmp_path, "[[bus]]\nnodes = [{address = 10}]\n")) == 1
+
+
 def test_an_echo_that_no_lane_gives_is(tmp_path: Path) -> None:
     text = "[[bus]]\nlanes = 2\nlinks = [{kind = 'pty', echo = true}]\nnodes = []\n"
     assert warnings(tmp_path, text) == [

@@ -96,6 +96,10 @@ def test_the_last_of_several_screens_counts() -> None:
     assert read(damaged + printed(one)) == one
 
 
+def test_a_last_line_alone_ends_no_screen() -> None:
+    assert read(PICTURE + "Q is at 9\n") == read(PICTURE)
+
+
 def test_spaces_do_as_well_as_tabs_and_empty_lines_are_passed_over() -> None:
     spaced = PICTURE.replace("\t", "  ").replace("=====", "\n" + "=" * 70 + "\n")
     assert read(spaced) == read(PICTURE)

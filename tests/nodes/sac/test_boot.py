@@ -142,7 +142,7 @@ def test_the_network_restores_nothing() -> None:
 def test_rst_restores_when_it_is_low_at_a_cold_boot(rst: int, cycle: int) -> None:
     panel = Panel()
     panel.hears("$Cb5000", "qs")
-    panel.node.rst = rst
+    panel.node.pins.drive("rst", rst, panel.now)
     panel.hears("$R")
     assert panel.node.eeprom.cycle == 5000
     panel.cycles_power()
@@ -257,7 +257,7 @@ def test_autorun_loops_over_the_saved_queue_after_a_cold_boot() -> None:
     assert panel.state() == "STANDBY"
     panel.cycles_power()
     panel.waits(LISTENS - 1)
-    assert panel.state() == "STANDBY"
+    assert panel.state() == "BOOT"
     panel.waits(1)
     assert visits(panel, 7) == [10, 20, 30, 10, 20, 30, 10]
 
@@ -298,7 +298,7 @@ def test_a_restored_node_that_starts_cold_waits_first() -> None:
     panel.node.restore({"autorun": 1})
     panel.bench.bus.touch(panel.node)
     panel.waits(LISTENS - 1)
-    assert panel.state() == "STANDBY"
+    assert panel.state() == "BOOT"
     panel.waits(1 * MS)
     assert panel.state() != "STANDBY"
 

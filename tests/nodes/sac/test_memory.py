@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nodes.sac import SacSettings
-from nodes.sac.memory import PINS, QUEUE, Memory, name_of, port_on_line
+from nodes.sac.memory import PINS, QUEUE, Memory, name_of
 from sacbus.language import QUEUE_LENGTH, Motion, Parameter, Session, seeded_row
 from sacbus.node import settings_from
 
@@ -62,11 +62,10 @@ def memories(draw: st.DrawFn) -> Memory:
 # ---- what is stored -----------------------------------------------------------------------------
 
 
-def test_the_factory_values_are_those_of_the_manual_and_all_are_stored_but_the_rates() -> None:
+def test_the_factory_values_are_the_manuals_and_all_are_stored_but_the_line_s_rate() -> None:
     stored = Memory().stored()
     assert stored.pop(PINS) == [0, 1, 2, 3, 4, 5, 6, 7]
-    rates = {"hw", "sw"}
-    assert stored == {name_of(one): one.factory for one in Parameter if name_of(one) not in rates}
+    assert stored == {name_of(one): one.factory for one in Parameter if one is not Parameter.SW}
 
 
 @given(memories())
@@ -236,29 +235,20 @@ def test_the_pin_map_is_that_of_the_third_driver_alone() -> None:
 
 
 def test_the_port_on_the_line_has_the_line_s_rate_until_somebody_sets_it() -> None:
-    assert [port_on_line(0), port_on_line(1)] == [Parameter.SW, Parameter.HW]
     memory = SacSettings().factory_memory(10, 9_600)
-    assert (memory.sw, memory.hw, memory.rate) == (9_600, 38_400, 9_600)
+    assert (memory.sw, memory.hw) == (9_600, 38_400)
     assert memory.factory(Parameter.SW) == 9_600
+    assert "sw" not in memory.stored()
     # Stored nowhere, so it may be put on another line.
     elsewhere = SacSettings().factory_memory(10, 19_200)
-    assert elsewhere.restored(memory.stored())[0].rate == 19_200
+    assert elsewhere.restored(memory.stored())[0].sw == 19_200
 
 
 def test_a_rate_that_was_set_is_stored_and_stays() -> None:
     memory = SacSettings().factory_memory(10, 9_600).with_values({Parameter.SW: 38_400})
     assert memory.stored()["sw"] == 38_400
     elsewhere = SacSettings().factory_memory(10, 19_200)
-    assert elsewhere.restored(memory.stored())[0].rate == 38_400
-
-
-def test_ports_that_change_places_take_the_rate_of_the_place() -> None:
-    memory = SacSettings().factory_memory(10, 9_600)
-    swapped = memory.with_values({Parameter.NETWORK: 1})
-    assert (swapped.sw, swapped.hw, swapped.rate) == (38_400, 9_600, 9_600)
-    assert swapped.with_values({Parameter.NETWORK: 0}) == memory
-    set_before = memory.with_values({Parameter.HW: 250_000})
-    assert set_before.with_values({Parameter.NETWORK: 1}).rate == 250_000
+    assert elsewhere.restored(memory.stored())[0].sw == 38_400
 
 
 # ---- settings -----------------------------------------------------------------------------------

@@ -33,6 +33,10 @@ class Desk:
             self.now += 20 * MS
             self.bench.hears(line, at=self.now, to=to)
 
+    def level(self, pin: str) -> int:
+        """The level of a pin now."""
+        return self.node.pins.level(pin, self.bench.kernel.now)
+
     def rests(self) -> None:
         """Until nothing is due."""
         self.bench.run()
@@ -274,16 +278,15 @@ def pulses(desk: Desk) -> object:
 def turned(desk: Desk) -> object:
     """The pin and the way of a command without a sign."""
     moved = desk.runs("m10")[1]
-    return desk.node.pins(desk.now).dir, moved
+    return desk.level("dir"), moved
 
 
 def ops(desk: Desk) -> object:
     desk.hears("m10v10")
     desk.bench.kernel.run_until(desk.now + 5 * MS)
-    running = desk.node.pins(desk.now + 5 * MS)
+    running = desk.level("op_sa"), desk.level("op_sb")
     desk.rests()
-    done = desk.node.pins(desk.now)
-    return (running.op_sa, running.op_sb), (done.op_sa, done.op_sb)
+    return running, (desk.level("op_sa"), desk.level("op_sb"))
 
 
 def answers(desk: Desk) -> object:
@@ -295,8 +298,7 @@ def crc(desk: Desk) -> object:
 
 
 def microstep_pins(desk: Desk) -> object:
-    pins = desk.node.pins(desk.now)
-    return pins.ms3, pins.ms2, pins.ms1
+    return desk.level("ms3"), desk.level("ms2"), desk.level("ms1")
 
 
 def width(desk: Desk) -> object:
@@ -453,16 +455,6 @@ def test_rates_may_differ_by_two_and_a_half_per_cent(baud: int, understood: bool
     desk = Desk(SacSettings(sw=baud))
     assert bool(desk.answered("v100")) is understood
     assert bool(desk.bench.told(ReportKind.WARNING)) is not understood
-
-
-def test_the_hardware_port_s_rate_counts_when_the_network_is_there() -> None:
-    desk = Desk()
-    desk.hears("$Cm250000", "$R")
-    assert desk.answered("v100") == [ack(1, NODE)]
-    desk.hears("$CE1", "$R")
-    assert desk.answered("v100") == []
-    (report,) = desk.bench.told(ReportKind.WARNING)
-    assert report.text.startswith("hw is 250000 baud")
 
 
 def test_a_node_is_born_with_the_rate_of_its_line() -> None:

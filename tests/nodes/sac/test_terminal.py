@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nodes.sac.boot import VERSION_LINE
 from sacbus.kernel import MS, SECOND
 from sacbus.language import Mode, ShowQueue, ShowSession
 from sacbus.language.queue_file import write_rows
@@ -43,6 +44,13 @@ class Console:
         bench.bus.touch(bench.node)
         bench.kernel.run_until(bench.kernel.now + 20 * MS)
         return self.shown[begin:].decode("latin-1")
+
+    @property
+    def mode(self) -> Mode:
+        """The mode that the terminal is in."""
+        terminal = self.bench.node._terminal
+        assert terminal is not None
+        return terminal.mode
 
     def queue(self) -> QueueScreen:
         screen = QueueScreen.read(self.types("q\r"))
@@ -143,9 +151,11 @@ def test_a_sign_within_a_line_or_in_a_mode_is_a_character(console: Console) -> N
     console.types("m-")
     assert console.bench.node.snapshot(0).position_pulses == 0
     console.types("\x7f\x7f\rqp\r")
-    console.types("+\r")
+    console.types("+")
+    assert console.bench.told() == []
+    console.types("8\r")
     assert console.bench.node.snapshot(0).position_pulses == 0
-    assert [report.line for report in console.bench.told()] == ["+"]
+    assert [report.line for report in console.bench.told()] == ["+8"]
 
 
 # ---- the manual's own sessions ------------------------------------------------------------------
@@ -211,7 +221,7 @@ def test_the_queue_is_edited_in_its_program_mode(console: Console) -> None:
     assert [report.line for report in console.bench.told()] == ["m2000"]
     assert console.types("S\r") == lines("S")
     assert console.types("x\r") == lines("x")
-    assert console.terminal.mode is Mode.PROMPT
+    assert console.mode is Mode.PROMPT
     assert [row.position for row in console.queue().rows if row.motion.steps == 2000] == [8]
 
 
@@ -361,6 +371,80 @@ def test_text_that_is_typed_without_an_address_goes_nowhere(console: Console) ->
     ]
 
 
+# ---- boots and settings -------------------------------------------------------------------------
+
+
+def test_a_warm_boot_shows_one_prompt_and_drops_what_was_typed(console: Console) -> None:
+    assert console.types("$R\r") == lines("$R")
+    console.types("qp\r8m")
+    begin = len(console.shown)
+    console.bench.hears("$R", at=SECOND)
+    console.bench.run()
+    assert console.shown[begin:] == b"\r\nSAC>"
+    assert console.mode is Mode.PROMPT
+    assert console.types("vd\r") == lines("vd", "100 RPM  cycle 3000")
+
+
+def test_a_cold_boot_shows_its_version_waits_a_second_and_prompts(console: Console) -> None:
+    node, kernel = console.bench.node, console.bench.kernel
+    console.types("$CL20\rv1")
+    begin = len(console.shown)
+    for on in (False, True):
+        node.power(on=on, now=kernel.now)
+        console.bench.bus.touch(node)
+        assert console.types("") == ""
+    assert console.shown[begin:].decode() == f"\r\n{VERSION_LINE}\r\n"
+    kernel.run_until(kernel.now + SECOND)
+    assert console.shown[begin:].decode() == f"\r\n{VERSION_LINE}\r\nSAC>"
+    # No key has come, so its memory is what it was.
+    assert "\r\nL slow         20\r\n" in console.types("cc\r")
+    assert console.types("vd\r") == lines("vd", "100 RPM  cycle 3000")
+
+
+def test_a_key_within_the_second_restores_the_factorys_memory_and_is_no_more_than_that(
+    console: Console,
+) -> None:
+    console.types("$CA14\r")
+    node = console.bench.node
+    for on in (False, True):
+        node.power(on=on, now=console.bench.kernel.now)
+    console.bench.bus.touch(node)
+    begin = len(console.shown)
+    console.types("+")
+    console.bench.run()
+    assert console.shown[begin:] == b"SAC>"
+    assert node.snapshot(0).position_pulses == 0
+    assert "A autorun      0 " in console.types("cc\r")
+
+
+def test_settings_of_the_session_show_on_its_screen(console: Console) -> None:
+    shown = console.types("$n\r$O1\r$K0\r$H0\r$L1\r$P\rcf\r").split("\r\n")
+    for row in ("encoder        EnT", "soft_ops       1", "ACK            0", "CRC            0"):
+        assert row in shown
+    for row in ("acc            10.47", "ramp           1", "full step      0"):
+        assert row in shown
+
+
+def test_the_configure_screen_is_shown_again_with_what_was_entered(console: Console) -> None:
+    console.types("$C\r")
+    shown = console.types("A14\r")
+    assert shown.startswith("A14\r\nConfig:\r\nA autorun      14     a sprf          200\r\n")
+    assert console.types("U23\r").startswith("U23\r\nConfig:\r\n")
+    assert console.types("G2\rX\r").count("Config:") == 1
+    assert "\r\nU pins         000 001 011 011 100 101 110 111\r\n" in console.types("$E\r")
+    assert "\r\nG dir          CCW    g" in console.types("cc\r")
+
+
+def test_the_dump_has_the_queue_that_was_saved(console: Console) -> None:
+    console.types("b\r")
+    before = console.types("$E\r").split("\r\n")
+    console.types("q1m600vc6000s\rqs\r")
+    after = console.types("$E\r").split("\r\n")
+    assert before[4] == "0030  96 00 00 00 00 01 02 03 04 05 06 07 FF FF FF FF"
+    # Position 1: held for sync, 600 steps.
+    assert after[4] == "0030  96 00 00 00 00 01 02 03 04 05 06 07 08 58 02 00"
+
+
 # ---- anything at all ----------------------------------------------------------------------------
 
 keys = st.binary(max_size=60) | st.lists(
@@ -401,4 +485,4 @@ def test_nothing_that_is_typed_or_sent_raises(typed: list[bytes], sent: list[byt
             node._messages.network_line(body, 7, NODE, console.bench.kernel.now)
             console.bench.bus.touch(node)
     assert console.types(b"\r\rX\r\r").endswith("SAC>")
-    assert console.terminal.mode is Mode.PROMPT
+    assert console.mode is Mode.PROMPT

@@ -56,8 +56,9 @@ def test_every_value_has_words(parameter: Parameter, data: st.DataObject) -> Non
         ({"ustep": 6, "r_id": 2}, Parameter.USTEP, "64 microsteps a full step"),
         ({"cycle": 5000}, Parameter.CYCLE, "us a full step, 60 RPM"),
         ({"ops": 0}, Parameter.OPS, "0 in binary: op_sa and op_sb stay low"),
-        ({"network": 1}, Parameter.HW, "as the line"),
-        ({"network": 1}, Parameter.SW, "baud"),
+        ({"network": 1}, Parameter.HW, "baud"),
+        ({"network": 1}, Parameter.SW, "as the line"),
+        ({"sw": 9_600}, Parameter.SW, "baud"),
         ({"override": 1}, Parameter.OVERRIDE, "commands count pulses"),
     ],
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sacbus.plan.fresh import fresh_file
+from sacbus.fresh import fresh_file
 
 
 def test_a_file_is_there_when_it_is_whole_and_not_before(tmp_path: Path) -> None:

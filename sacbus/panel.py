@@ -1,0 +1,122 @@
+"""A node's panel, in the hands of who hosts its bus: what can be seen of it and done to it.
+
+Owns the way from outside the bus to a node's pins, encoder, switch and terminal: bus time is
+brought up to date first, and the bus asks the node anew what it wants to do next. What a pin does
+is the node's affair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from sacbus.bus import Bus
+from sacbus.console import Console
+from sacbus.host import Host
+from sacbus.kernel import Ns
+from sacbus.node import Node, PinError, Pins, Snapshot
+
+__all__ = ["ENCODER", "Panel"]
+
+#: The encoder's inputs, by the names that a node with an encoder gives them.
+ENCODER: Final = ("enA", "enB")
+
+#: What becomes of them in the four quarters of a clockwise detent, from rest, both high.
+_QUARTERS: Final = ((0, 0), (1, 0), (0, 1), (1, 1))
+
+
+class Panel:
+    """One node as it stands on the bench, in virtual time as in real time.
+
+    ::
+
+        panel = bus.panel(10)
+        panel.level("op_sa")               # 1 while a command runs
+        panel.drive("sync", 0)             # the held command starts
+        panel.turn(-3)                     # three detents of the encoder, counterclockwise
+        panel.watch(print)                 # op_sa 1 2000040000 ...
+        panel.power(on=False)
+
+    Deeds are done at once, at the bus time that is now. Names of pins, and levels, that the node
+    does not have are refused with PinError, a line that a user can act on.
+    """
+
+    def __init__(self, node: Node, bus: Bus, host: Host, console: Console | None) -> None:
+        self.node = node
+        #: Its terminal; None if it has none.
+        self.console = console
+        self._bus = bus
+        self._host = host
+        self._watchers: list[Callable[[str, int, Ns], object]] = []
+
+    def snapshot(self) -> Snapshot:
+        """The node as it is now."""
+        return self.node.snapshot(self._now())
+
+    def level(self, pin: str) -> int:
+        """The level of a pin now, whether it is driven or drives; xclk: Hz."""
+        return self._pins().level(pin, self._now())
+
+    def drive(self, pin: str, level: int) -> None:
+        """Drive an input to a level now; xclk: to a frequency in Hz."""
+        pins = self._pins()
+        self._do(lambda now: pins.drive(pin, level, now))
+
+    def turn(self, detents: int) -> None:
+        """Turn the encoder by so many detents, clockwise positive, all of them now."""
+        pins = self._pins()
+
+        def quarters(now: Ns) -> None:
+            for _ in range(abs(detents)):
+                for which, level in _QUARTERS:
+                    # Counterclockwise the second one goes before the first.
+                    pins.drive(ENCODER[which if detents > 0 else 1 - which], level, now)
+
+        self._do(quarters)
+
+    def power(self, *, on: bool) -> None:
+        """Switch the node off, or on again for a cold boot; nothing if it is that already."""
+        self._do(lambda now: self.node.power(on=on, now=now))
+
+    def watch(self, watcher: Callable[[str, int, Ns], object]) -> Callable[[], None]:
+        """Have ``watcher(pin, level, when)`` called at each edge of an output from now on.
+
+        Which outputs are told of, the node says (``sacbus.node.Pins.told``). What is given ends it.
+        """
+        self._watchers.append(watcher)
+        if len(self._watchers) == 1:
+            pins = self._pins()
+            self._do(lambda now: pins.watch(self._tell, now))
+
+        def end() -> None:
+            if watcher in self._watchers:
+                self._watchers.remove(watcher)
+                if not self._watchers:
+                    self._do(lambda now: self._pins().watch(None, now))
+
+        return end
+
+    def _tell(self, pin: str, level: int, when: Ns) -> None:
+        for watcher in tuple(self._watchers):
+            watcher(pin, level, when)
+
+    def _pins(self) -> Pins:
+        pins = self.node.pins
+        if pins is None:
+            raise PinError(f"node {self.node.address} is of kind {self.node.kind}: it has no pins")
+        return pins
+
+    def _now(self) -> Ns:
+        self._host.arrive(_nothing)
+        return self._host.kernel.now
+
+    def _do(self, deed: Callable[[Ns], object]) -> None:
+        def done() -> None:
+            deed(self._host.kernel.now)
+            self._bus.touch(self.node)
+
+        self._host.arrive(done)
+
+
+def _nothing() -> None:
+    """What is done to bring bus time up to date."""
