@@ -125,4 +125,6 @@ def test_a_memory_of_a_kind_that_is_not_installed_is_told(tmp_path: Path, capsys
 
 def test_without_a_command_its_help_is_shown(capsys: Captured) -> None:
     assert run(["eeprom"]) == 2
-    assert capsys.readouterr().out == ""
+    written = capsys.readouterr()
+    assert written.out == ""
+    assert written.err.startswith("Usage: sacbus eeprom ")

@@ -174,6 +174,8 @@ def test_without_power_nothing_moves_and_nothing_is_heard_or_said() -> None:
     position = panel.bench.position(panel.now)
     assert not panel.obeys()
     assert panel.types("m200\r") == ""
+    panel.hears("m200")
+    assert panel.node.commands.current is None
     assert panel.bench.position(panel.now + SECOND) == position
     assert panel.bench.answers == []
 

@@ -57,7 +57,8 @@ def test_every_value_has_words(parameter: Parameter, data: st.DataObject) -> Non
         ({"cycle": 5000}, Parameter.CYCLE, "us a full step, 60 RPM"),
         ({"ops": 0}, Parameter.OPS, "0 in binary: op_sa and op_sb stay low"),
         ({"network": 1}, Parameter.HW, "baud"),
-        ({"sw": 19_200}, Parameter.SW, "baud"),
+        ({"network": 1}, Parameter.SW, "as the line"),
+        ({"sw": 9_600}, Parameter.SW, "baud"),
         ({"override": 1}, Parameter.OVERRIDE, "commands count pulses"),
     ],
 )
