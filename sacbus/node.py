@@ -261,6 +261,13 @@ class Node(Contract):
         """What can be seen of it at ``now``; changes nothing."""
         ...
 
+    def power(self, *, on: bool, now: Ns) -> None:
+        """Switch it off, or on again for a cold boot; nothing if it is that already.
+
+        Off, it forgets all but its EEPROM. The owner asks the bus to touch the node afterwards.
+        """
+        ...
+
     #: Called by the node each time the contents of its EEPROM have changed.
     memory_changed: Callable[[], None] | None
 

@@ -41,13 +41,19 @@ class Panel:
     does not have are refused with PinError, a line that a user can act on.
     """
 
-    def __init__(self, node: Node, bus: Bus, host: Host, console: Console | None) -> None:
+    def __init__(self, node: Node, bus: Bus, host: Host) -> None:
         self.node = node
-        #: Its terminal; None if it has none.
-        self.console = console
         self._bus = bus
         self._host = host
+        self._console: Console | None = None
         self._watchers: list[Callable[[str, int, Ns], object]] = []
+
+    @property
+    def console(self) -> Console | None:
+        """Its terminal; None if its kind has none."""
+        if self._console is None and (port := self.node.terminal) is not None:
+            self._console = Console(self.node, port, self._bus, self._host)
+        return self._console
 
     def snapshot(self) -> Snapshot:
         """The node as it is now."""
@@ -103,7 +109,7 @@ class Panel:
     def _pins(self) -> Pins:
         pins = self.node.pins
         if pins is None:
-            raise PinError(f"node {self.node.address} is of kind {self.node.kind}: it has no pins")
+            raise PinError(f"node {self.node.address} has no pins")
         return pins
 
     def _now(self) -> Ns:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from random import Random
@@ -22,8 +23,8 @@ from sacbus.links.places import PtyAt
 from sacbus.links.rfc2217 import Rfc2217Server
 from sacbus.links.tcp import TcpServer
 from sacbus.mother import LineLost, Mother
-from sacbus.node import Heard, KindError, SettingError, find_kind
-from sacbus.state import StateDirectory, StateError
+from sacbus.node import Heard, KindError, ReportKind, SettingError, find_kind
+from sacbus.state import StateDirectory, StateError, read_memory
 from sacbus.wire import encode
 
 _T = TypeVar("_T")
@@ -291,6 +292,75 @@ def test_the_stored_address_wins_and_the_difference_is_told(tmp_path: Path) -> N
     # Its memory stays where the configuration looks for it.
     assert json.loads((tmp_path / "bus" / "10").read_text())["memory"]["d_id"] == 77
     assert not (tmp_path / "bus" / "77").exists()
+
+
+def on_disk(place: Path, address: int) -> dict[str, object]:
+    return read_memory(place / "bus" / str(address)).memory
+
+
+def test_a_change_is_on_the_disk_at_once_in_virtual_time(tmp_path: Path) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(state=tmp_path)) as bus:
+            await bus.mother().send(11, "$CJ2")
+            assert on_disk(tmp_path, 11)["ustep"] == 2
+            assert on_disk(tmp_path, 10)["ustep"] == 0
+            await bus.mother().send(11, "qs")
+            assert "queue" in on_disk(tmp_path, 11)
+
+    virtually(scene())
+
+
+def test_a_change_is_on_the_disk_soon_in_real_time(tmp_path: Path) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(state=tmp_path)) as bus:
+            await bus.mother().send(11, "$CJ2")
+            await until(lambda: on_disk(tmp_path, 11)["ustep"] == 2)
+            assert "sacbus memory" in {thread.name for thread in threading.enumerate()}
+            await bus.mother().send(12, "$CJ3")
+        # All that was waiting is written when the bus is closed, and nobody is left to write.
+        assert on_disk(tmp_path, 12)["ustep"] == 3
+        assert "sacbus memory" not in {thread.name for thread in threading.enumerate()}
+
+    asyncio.run(scene())
+
+
+def test_a_node_that_has_a_new_address_keeps_its_file(tmp_path: Path) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10,), state=tmp_path)) as bus:
+            mother = bus.mother()
+            await mother.send(10, "$CM99")
+            await mother.send(10, "$R")
+            await mother.send(99, "$CJ2")
+
+    virtually(scene())
+    assert [one.name for one in (tmp_path / "bus").iterdir()] == ["10"]
+    assert (on_disk(tmp_path, 10)["d_id"], on_disk(tmp_path, 10)["ustep"]) == (99, 2)
+
+
+@pytest.mark.parametrize("run", [virtually, asyncio.run])
+def test_a_save_that_fails_while_the_bus_runs_is_reported_and_the_node_goes_on(
+    tmp_path: Path, run: Callable[[Coroutine[Any, Any, None]], None]
+) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10,), state=tmp_path)) as bus:
+            mother = bus.mother()
+            (tmp_path / "bus" / "10").unlink()
+            (tmp_path / "bus" / "10" / "something").mkdir(parents=True)
+            await mother.send(10, "$CJ2")
+            await until(lambda: bus.bus.reports)
+            (report,) = bus.bus.reports
+            assert (report.address, report.kind) == (10, ReportKind.WARNING)
+            assert "cannot write node memory" in report.text
+            assert str(tmp_path / "bus" / "10") in report.text
+            await mother.send(10, "v100")
+            (tmp_path / "bus" / "10" / "something").rmdir()
+            (tmp_path / "bus" / "10").rmdir()
+            await mother.send(10, "$CJ3")
+            await until((tmp_path / "bus" / "10").is_file)
+            assert len(bus.bus.reports) == 1
+
+    run(scene())
+    assert on_disk(tmp_path, 10)["ustep"] == 3
 
 
 def test_a_damaged_memory_is_told_and_the_node_starts_as_new(tmp_path: Path) -> None:

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sacbus.state import StateDirectory, StateError, default_directory
+from sacbus.state import StateDirectory, StateError, Stored, default_directory, read_memory
 
-MEMORY = {"d_id": 10, "sprf": 200}
+MEMORY: dict[str, object] = {"d_id": 10, "sprf": 200, "queue": ["1 , 200", "2 , 5"]}
 
 
 @pytest.fixture
@@ -156,6 +156,65 @@ def test_a_file_that_cannot_be_read_is_told_and_left_alone(state: StateDirectory
     with pytest.raises(StateError, match="cannot read node memory"):
         state.load(10, "sac")
     assert state.path(10).is_dir()
+
+
+def test_what_a_killed_save_left_behind_is_cleared_away_and_nothing_else(
+    state: StateDirectory,
+) -> None:
+    state.save(10, "sac", MEMORY)
+    place = state.path(10).parent
+    for name in (".10.4711.new", ".11.1.new", "10.damaged", ".hidden"):
+        (place / name).write_text("half")
+    state.claim()
+    try:
+        assert {one.name for one in place.iterdir()} == {"10", "10.damaged", ".hidden"}
+    finally:
+        state.release()
+
+
+def test_who_has_not_got_the_directory_clears_nothing_away(
+    state: StateDirectory, tmp_path: Path
+) -> None:
+    state.claim()
+    (state.path(10).parent / ".10.4711.new").write_text("being written")
+    try:
+        with pytest.raises(StateError, match="in use by another sacbus"):
+            StateDirectory(tmp_path / "state", "bus").claim()
+        assert (state.path(10).parent / ".10.4711.new").exists()
+    finally:
+        state.release()
+
+
+# ---- reading a file, wherever it lies -----------------------------------------------------------
+
+
+def test_a_file_can_be_read_without_knowing_whose_it_is(state: StateDirectory) -> None:
+    state.save(10, "sac", MEMORY)
+    moved = state.path(10).rename(state.path(10).with_name("a copy"))
+    assert read_memory(moved) == Stored("sac", MEMORY)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_that_is_only_looked_at_is_told_and_stays(
+    state: StateDirectory, damage: str
+) -> None:
+    state.save(10, "sac", MEMORY)
+    path = state.path(10)
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
+    with pytest.raises(StateError, match="this is no node's memory that can be trusted") as told:
+        read_memory(path)
+    assert str(path) in str(told.value)
+    assert "\n" not in str(told.value)
+    assert path.exists()
+
+
+def test_a_missing_file_is_told(tmp_path: Path) -> None:
+    with pytest.raises(StateError) as told:
+        read_memory(tmp_path / "10")
+    assert str(told.value) == (
+        f"cannot read node memory (No such file or directory), {tmp_path}/10, give the file of a "
+        "node: ADDRESS in the directory of its bus"
+    )
 
 
 def test_the_default_directory_is_the_users_own() -> None:

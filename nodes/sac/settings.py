@@ -41,9 +41,8 @@ def _number(parameter: Parameter, words: str) -> Any:  # noqa: ANN401
     return field(default=parameter.factory, metadata=limits)
 
 
-def _rate(parameter: Parameter, port: str) -> Any:  # noqa: ANN401
-    """A port's rate, which may be left to the line."""
-    words = f"baud of the {port} port; 0: as the line if it is on it, else {BAUD}"
+def _rate(parameter: Parameter, words: str) -> Any:  # noqa: ANN401
+    """A port's rate; 0 leaves it to where the port is."""
     return field(default=0, metadata={"low": 0, "high": parameter.largest, "help": words})
 
 
@@ -101,8 +100,8 @@ class SacSettings(NodeSettings):
     network: bool = _flag(
         Parameter.NETWORK, "network at the hardware port, terminal at the software port"
     )
-    hw: int = _rate(Parameter.HW, "hardware")
-    sw: int = _rate(Parameter.SW, "software")
+    hw: int = _rate(Parameter.HW, f"baud of the hardware port; 0: {BAUD}")
+    sw: int = _rate(Parameter.SW, "baud of the software port, which is on the line; 0: as the line")
 
     ppm: int = field(
         default=0,
@@ -174,8 +173,7 @@ class SacSettings(NodeSettings):
     def factory_memory(self, address: int, line: int = BAUD) -> Memory:
         """The EEPROM at the first boot of a node at ``address``, on a line of ``line`` baud."""
         values = {one: int(getattr(self, name)) for name, one in _PARAMETERS.items()}
-        network = values[Parameter.NETWORK]
-        born = Memory(d_id=address, line=line, network=network)
+        born = Memory(d_id=address, line=line)
         for port in (Parameter.HW, Parameter.SW):
             values[port] = values[port] or born.factory(port)
         return born.with_values(values)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sacbus.cli.options import verbose
+from sacbus.cli.options import USAGE_STATUS, verbose
 
 if TYPE_CHECKING:
     from sacbus.node import MemoryTable, MemoryWords
@@ -18,13 +18,20 @@ if TYPE_CHECKING:
 __all__ = ["eeprom_group"]
 
 
-@click.group("eeprom")
-def eeprom_group() -> None:
+@click.group("eeprom", invoke_without_command=True)
+@verbose
+@click.pass_context
+def eeprom_group(context: click.Context) -> int | None:
     """Look into the EEPROM files of nodes.
 
     \b
     Example: sacbus eeprom show ~/.local/state/sacbus/bus/10
     """
+    if context.invoked_subcommand is not None:
+        return None
+    # Nothing was asked for; whoever wrote this into a script should notice.
+    click.echo(context.get_help(), err=True)
+    return USAGE_STATUS
 
 
 @eeprom_group.command("show")

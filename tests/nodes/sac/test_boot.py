@@ -174,6 +174,8 @@ def test_without_power_nothing_moves_and_nothing_is_heard_or_said() -> None:
     position = panel.bench.position(panel.now)
     assert not panel.obeys()
     assert panel.types("m200\r") == ""
+    panel.hears("m200")
+    assert panel.node.commands.current is None
     assert panel.bench.position(panel.now + SECOND) == position
     assert panel.bench.answers == []
 
@@ -257,7 +259,7 @@ def test_autorun_loops_over_the_saved_queue_after_a_cold_boot() -> None:
     assert panel.state() == "STANDBY"
     panel.cycles_power()
     panel.waits(LISTENS - 1)
-    assert panel.state() == "STANDBY"
+    assert panel.state() == "BOOT"
     panel.waits(1)
     assert visits(panel, 7) == [10, 20, 30, 10, 20, 30, 10]
 
@@ -298,7 +300,7 @@ def test_a_restored_node_that_starts_cold_waits_first() -> None:
     panel.node.restore({"autorun": 1})
     panel.bench.bus.touch(panel.node)
     panel.waits(LISTENS - 1)
-    assert panel.state() == "STANDBY"
+    assert panel.state() == "BOOT"
     panel.waits(1 * MS)
     assert panel.state() != "STANDBY"
 

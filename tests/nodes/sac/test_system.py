@@ -413,6 +413,14 @@ def test_a_node_is_found_at_its_new_address_after_the_reboot_and_not_before(desk
     assert desk.bench.bus.node(99) is desk.node
 
 
+def test_a_node_that_was_given_another_memory_is_found_once_it_is_touched(desk: Desk) -> None:
+    desk.node.restore({"d_id": 99})
+    desk.bench.bus.touch(desk.node)
+    desk.hears("v100", to=99)
+    desk.rests()
+    assert desk.bench.answers == [ack(1, 99)]
+
+
 def test_two_nodes_may_change_their_addresses_one_after_the_other() -> None:
     bench = Bench(10, 11)
     for number, (line, to) in enumerate([("$CM12", 10), ("$R", 10), ("$CM10", 11), ("$R", 11)]):

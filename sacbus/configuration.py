@@ -1,0 +1,110 @@
+"""What a bus is made of, as values: its nodes, its line, its links; and what no bus can be.
+
+Owns the configuration and its checks. Opens nothing, and knows no file: those are
+``sacbus.config``'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from sacbus.bus import PLAIN_BITS
+from sacbus.links.places import AdapterAt, Place
+from sacbus.node import Protocol, SettingError, find_kind, settings_from
+
+__all__ = ["FASTEST", "SLOWEST", "Configuration", "NodeAt", "check"]
+
+#: Bus seconds in a second: beyond these, times in seconds are no numbers any more.
+SLOWEST: Final = 1e-6
+FASTEST: Final = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class NodeAt:
+    """A node of a configuration: its address, and the settings of its kind that differ."""
+
+    address: int
+    kind: str = "sac"
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """One bus: its nodes, its line, its links.
+
+    A node that is a mere address is of ``kind``, with ``settings``; a bus without nodes speaks the
+    protocol of ``kind``. ``baud`` and ``lanes`` override the protocol's. ``state``: the directory
+    for the nodes' EEPROM, None keeps it in memory. ``speed`` scales bus time; ``pace`` False lets
+    the line run ahead of the clock. ``terminals``: a pty for each node's terminal port.
+    """
+
+    nodes: tuple[NodeAt | int, ...] = (10, 11, 12)
+    kind: str = "sac"
+    settings: Mapping[str, object] = field(default_factory=dict)
+    name: str = "bus"
+    baud: int | None = None
+    lanes: int | None = None
+    seed: int = 0
+    links: tuple[Place, ...] = ()
+    state: Path | None = None
+    speed: float = 1.0
+    pace: bool = True
+    terminals: bool = False
+
+    @property
+    def every_node(self) -> tuple[NodeAt, ...]:
+        """All nodes in full."""
+        return tuple(
+            one if isinstance(one, NodeAt) else NodeAt(one, self.kind, self.settings)
+            for one in self.nodes
+        )
+
+
+def check(configuration: Configuration) -> Protocol:
+    """Refuse what no node and no line can be, and two nodes that would share a memory.
+
+    SettingError or KindError for the first mistake; otherwise the protocol that all nodes speak.
+    """
+    if not SLOWEST <= configuration.speed <= FASTEST:
+        raise SettingError(
+            f"speed: expected a number from {SLOWEST:f} to {FASTEST:.0f}, got {configuration.speed}"
+        )
+    if configuration.baud is not None and not 300 <= configuration.baud <= 4_000_000:
+        raise SettingError(f"baud: expected 300 to 4000000, got {configuration.baud}")
+    if configuration.lanes not in (None, 1, 2):
+        raise SettingError(f"lanes: expected 1 or 2, got {configuration.lanes}")
+    protocol = find_kind(configuration.kind).protocol
+    seen: set[int] = set()
+    nodes = configuration.every_node
+    for number, node in enumerate(nodes):
+        if not 4 <= node.address <= 255:
+            raise SettingError(f"nodes: expected addresses from 4 to 255, got {node.address!r}")
+        if node.address in seen:
+            raise SettingError(f"nodes: expected every address once, got {node.address} twice")
+        seen.add(node.address)
+        kind = find_kind(node.kind)
+        settings_from(kind.settings, node.settings)
+        if number == 0:
+            protocol = kind.protocol
+        elif kind.protocol.name != protocol.name:
+            raise SettingError(
+                f"nodes: expected one protocol on a line, got {protocol.name} (node "
+                f"{nodes[0].address}) and {kind.protocol.name} (node {node.address})"
+            )
+    if any(isinstance(place, AdapterAt) for place in configuration.links):
+        if configuration.speed != 1:
+            raise SettingError(
+                f"speed: expected 1 with a real adapter, which keeps real time, got "
+                f"{configuration.speed}"
+            )
+        if not configuration.pace:
+            raise SettingError("pace: expected true with a real adapter, which keeps real time")
+        if protocol.rate.bits > PLAIN_BITS:
+            raise SettingError(
+                f"links: an adapter hears no ninth bits, which {protocol.name} has; use a pty, TCP "
+                "or RFC 2217"
+            )
+    return protocol

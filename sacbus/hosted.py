@@ -1,0 +1,268 @@
+"""A bus that runs, in the hands of who hosts it.
+
+Owns who is on it from outside (programs, adapters, mothers, terminals), how they are let go, and
+the saving of the nodes' memory. How one is built is the daemon's business.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from random import Random
+
+from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, LivePort, Port
+from sacbus.configuration import Configuration, NodeAt
+from sacbus.console import Console
+from sacbus.host import Host, VirtualHost
+from sacbus.kernel import SECOND, Ns
+from sacbus.links import Link, Tuning
+from sacbus.links.link import Server
+from sacbus.mother import Mother
+from sacbus.node import BOOT, Heard, Node, Report, ReportKind, Snapshot
+from sacbus.panel import Panel
+from sacbus.saving import AtOnce, Saving, Thread
+from sacbus.state import StateDirectory, StateError
+
+__all__ = ["HostedBus"]
+
+
+class HostedBus:
+    """A bus that runs: its nodes can be looked at, driven by mother, and connected to."""
+
+    def __init__(self, configuration: Configuration, bus: Bus, host: Host) -> None:
+        self.configuration = configuration
+        self.bus = bus
+        self.host = host
+        #: Where programs get in, in the order of the configuration.
+        self.links: list[Link | Server] = []
+        #: Everyone with a port of their own: programs, adapters, mothers.
+        self._ports: list[Port | LivePort] = []
+        #: Ports of programs that have left, which may have something to send yet.
+        self._leaving: list[Port] = []
+        self._mothers: list[Mother] = []
+        #: Where programs get at the nodes' terminals, by the addresses of the configuration.
+        self.terminals: dict[int, Link] = {}
+        #: By the identity of the node, which lasts as long as its bus.
+        self._panels: dict[int, Panel] = {}
+        #: Nodes in the order of the configuration, whose addresses name their memory.
+        self._configured = tuple(zip(configuration.every_node, bus.nodes, strict=True))
+
+    @property
+    def talkers(self) -> int:
+        """How many ports there are now: programs that a server let in, ptys, adapters, mothers."""
+        return len(self._ports)
+
+    def now(self) -> Ns:
+        """Bus time, brought up to date with the clock."""
+        self.host.arrive(lambda: None)
+        return self.host.kernel.now
+
+    def snapshots(self) -> list[Snapshot]:
+        """All nodes as they are now."""
+        now = self.now()
+        return [node.snapshot(now) for node in self.bus.nodes]
+
+    def snapshot(self, address: int) -> Snapshot:
+        """One node as it is now; KeyError when there is none."""
+        return self.bus.node(address).snapshot(self.now())
+
+    def panel(self, address: int) -> Panel:
+        """A node's pins, encoder, switch and terminal; KeyError when there is no such node."""
+        return self._panel(self.bus.node(address))
+
+    def terminal(self, address: int) -> Console:
+        """The terminal of a node, to type at and to read; KeyError when there is none.
+
+        What the node shows is kept for who reads it from the first time on that this is called.
+        """
+        console = self._console(self.bus.node(address))
+        console.listen()
+        return console
+
+    def attach_terminal(self, address: int, link: Link) -> None:
+        """Open a link to the terminal of the node that is configured at ``address``.
+
+        LinkError when the link cannot be had, KeyError when the node has no terminal, as in
+        :meth:`terminal`. It is closed with the bus.
+        """
+        node = next((node for at, node in self._configured if at.address == address), None)
+        if node is None:
+            raise KeyError(f"no node {address} on {self.bus.name}")
+        self._console(node).open(link)
+        self.terminals[address] = link
+
+    def _console(self, node: Node) -> Console:
+        console = self._panel(node).console
+        if console is None:
+            raise KeyError(f"node {node.address} has no terminal port")
+        return console
+
+    def _panel(self, node: Node) -> Panel:
+        panel = self._panels.get(id(node))
+        if panel is None:
+            panel = self._panels[id(node)] = Panel(node, self.bus, self.host)
+        return panel
+
+    async def booted(self) -> None:
+        """Wait until no node is on its way from power to obedience."""
+        while starting := [one for one in self.bus.nodes if one.state(self.now()) == BOOT]:
+            over = max(one.wake_at() or 0 for one in starting)
+            await asyncio.sleep((over - self.now()) / SECOND / self.configuration.speed)
+
+    def tell(self, text: str) -> None:
+        """Report something about the line or a link, now."""
+        self.bus.tell(Report(self.now(), None, ReportKind.WARNING, text))
+
+    def attach(self, link: Link, *, echo: bool = False, latency: Ns = LATENCY) -> Port:
+        """Open a link, put its bytes on the line, and the line's on the link.
+
+        LinkError when it cannot be had. It is closed with the bus.
+        """
+        port = self._seat(link, echo=echo, latency=latency)
+        self.links.append(link)
+        return port
+
+    def attach_live(self, link: Link) -> LivePort:
+        """Open a link to a real line that this one is to be one with; else as :meth:`attach`."""
+
+        def deliver(data: bytes) -> None:
+            self.host.arrive(port.talk, data)
+
+        def hold(held: bool) -> None:
+            link.hold(held=held)
+
+        port = LivePort(self.bus.medium, link.send, name=link.where, hold=hold)
+        try:
+            link.open(deliver)
+        except BaseException:
+            port.close()
+            raise
+        self.links.append(link)
+        self._ports.append(port)
+        return port
+
+    async def let_in(self, server: Server, *, echo: bool = False, latency: Ns = LATENCY) -> None:
+        """Open a server; everyone it lets in gets a port as from :meth:`attach`, while they stay.
+
+        What a program had said before it left is still sent.
+        """
+
+        def admit(link: Link) -> Callable[[], None]:
+            port = self._seat(link, echo=echo, latency=latency)
+
+            def gone() -> None:
+                self._ports.remove(port)
+                self._let_go(port)
+
+            return gone
+
+        await server.open(admit)
+        self.links.append(server)
+
+    def _let_go(self, port: Port) -> None:
+        """Have a port send to its end what its program had said, unless many have left so much."""
+        self._leaving = [one for one in self._leaving if one.unsent]
+        if sum(one.unsent for one in self._leaving) + port.unsent > FULL:
+            port.close()
+        else:
+            port.leave()
+            self._leaving.append(port)
+
+    def _seat(self, link: Link, *, echo: bool, latency: Ns) -> Port:
+        rate = self.bus.rate
+        noise = Random(self.configuration.seed)
+        tuning = Tuning(link, rate.baud, noise, self.tell, bits=rate.bits)
+
+        def hear(heard: Heard, _now: Ns) -> None:
+            link.send(tuning.to_client(heard.data))
+
+        arrive = self.host.arrive
+
+        def deliver(data: bytes) -> None:
+            arrive(port.talk, tuning.from_client(data))
+
+        def deliver_nine(data: bytes) -> None:
+            # Parity and bytes come in this order. Without parity a stop bit stands in its place.
+            ninth = tuning.ninth()
+            arrive(port.talk, tuning.from_client(data), 1 if ninth is None else ninth)
+
+        def hold(held: bool) -> None:
+            link.hold(held=held)
+
+        port = Port(self.bus.medium, hear, latency=latency, echo=echo, hold=hold)
+        try:
+            # A quick program's bytes may be delivered before this comes back.
+            link.open(deliver_nine if rate.bits > PLAIN_BITS else deliver)
+        except BaseException:
+            port.close()
+            raise
+        port.name = link.where  # of a pty without a symlink known only now
+        self._ports.append(port)
+        return port
+
+    def mother(self) -> Mother:
+        """Mother on this very bus, at no distance from the line."""
+
+        def hear(heard: Heard, _now: int) -> None:
+            mother.hear(heard.data)
+
+        port = Port(self.bus.medium, hear, latency=0, name="mother")
+        self._ports.append(port)
+        mother = Mother(
+            self.host.kernel,
+            port.talk,
+            rate=self.bus.rate,
+            unsent=lambda: port.unsent,
+            arrive=self.host.arrive,
+        )
+        self._mothers.append(mother)
+        return mother
+
+    def close(self) -> None:
+        """Let everybody go: links are closed, and mothers are told that the line is gone."""
+        with ExitStack() as stack:  # the rest is closed also when a link cannot be
+            stack.callback(self.host.close)
+            for mother in self._mothers:
+                stack.callback(mother.lose, "the bus is closed")
+            for port in (*self._ports, *self._leaving):
+                stack.callback(port.close)
+            for link in (*self.links, *self.terminals.values()):
+                stack.callback(link.close)
+
+    def keep(self, state: StateDirectory) -> Callable[[], None]:
+        """Save a node's memory whenever it changes; a save that fails is reported.
+
+        What is given ends that, once all is written; what has failed is left to :meth:`save`.
+        """
+
+        def failed(address: int, text: str) -> None:
+            self.bus.tell(Report(self.now(), address, ReportKind.WARNING, text))
+
+        virtual = isinstance(self.host, VirtualHost)
+        saving = AtOnce(state, failed) if virtual else Thread(state, failed)
+        for wanted, node in self._configured:
+            node.memory_changed = partial(_save, saving, wanted, node)
+
+        def end() -> None:
+            for _, node in self._configured:
+                node.memory_changed = None
+            saving.close()
+
+        return end
+
+    def save(self, state: StateDirectory) -> None:
+        """Write every node's memory; StateError for the first that could not be written."""
+        failed: StateError | None = None
+        for wanted, node in self._configured:
+            try:
+                state.save(wanted.address, wanted.kind, node.persist())
+            except StateError as fault:  # the others' memories are worth no less
+                failed = failed or fault
+        if failed is not None:
+            raise failed
+
+
+def _save(saving: Saving, wanted: NodeAt, node: Node) -> None:
+    saving.save(wanted.address, wanted.kind, node.persist())
