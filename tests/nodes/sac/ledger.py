@@ -22,18 +22,23 @@ from sacbus.language import (
     Acceleration,
     ClearQueue,
     Command,
+    Configure,
     Deceleration,
     EditQueue,
     Forward,
-    Mode,
     Motion,
     Move,
     Next,
+    ProgramQueue,
+    ProgramReferences,
     Ramp,
     Reboot,
     ReleaseSync,
     RestoreQueue,
     RunPosition,
+    SendAcks,
+    SendCrcs,
+    SendSoftOps,
     Session,
     SinglePulses,
     StepMode,
@@ -45,6 +50,7 @@ from sacbus.language import (
     Velocity,
     cleared_row,
     edited,
+    parse,
     parse_in,
     seeded_row,
 )
@@ -62,14 +68,17 @@ class WatchedNode(SacNode):
     def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         ledger = self.ledger
         ledger.before_packet(source, destination)
-        before = ledger.before_line(Mode.PROMPT, body, now)
+        command = parse(body).command
+        if isinstance(command, ProgramQueue | ProgramReferences | Configure):
+            command = None  # opens a screen, and that does nothing from here
+        before = ledger.before_line(command, now)
         super().network_line(body, source, destination, now)
         ledger.after_line(before, now)
 
     def line_typed(self, line: bytes, now: Ns) -> None:
         ledger = self.ledger
         terminal = self._terminal_port()
-        before = ledger.before_line(terminal.mode, line, now)
+        before = ledger.before_line(parse_in(terminal.mode, line).command, now)
         super().line_typed(line, now)
         ledger.after_line(before, now)
 
@@ -139,7 +148,7 @@ class Ledger:
     # ---- time ----
 
     def passed(self, now: Ns) -> None:
-        """Time has passed, and nothing was due: what runs has gone on, what stands has not moved."""
+        """Nothing was due up to ``now``: what runs has gone on, what stands has not moved."""
         before, after = self.position, self._where(now)
         run = self.run
         if run is None:
@@ -178,6 +187,14 @@ class Ledger:
         self.estop_is_low = not level
         if not level:
             self.disturb()
+
+    def stands(self) -> None:
+        """All has been stopped just now: nothing runs, waits, or is to come."""
+        commands = self.node.commands
+        assert commands.current is None
+        assert commands.held is None
+        assert not commands.pending
+        assert not commands.looping
 
     def may_step(self, pulses: int) -> None:
         """Single pulses are due, if nothing runs; without a command that would count them."""
@@ -222,7 +239,7 @@ class Ledger:
             assert motion is not None
             endless = motion.steps is None
             self.run = Run(profile, motion, self.position[0], engine.started, disturbed=endless)
-            if self.node.soft_ops:
+            if self.soft_ops:
                 for code in (DC1, DC2):
                     self.owed[self._packet(GENERAL_CALL, bytes((code,)))] += 1
         if self.run is None:
@@ -251,16 +268,21 @@ class Ledger:
         self.position = (0, 0)
         self.pending = ()
         self.last_source = GENERAL_CALL
-        self.session = Session.start(self.node.eeprom.defaults())
+        self._begin_session()
+
+    def _begin_session(self) -> None:
+        """The settings of the session are the memory's."""
+        memory = self.node.eeprom
+        self.session = Session.start(memory.defaults())
+        self.soft_ops, self.acks, self.crcs = memory.soft_ops, memory.ack, memory.crc
 
     # ---- lines ----
 
-    def before_line(self, mode: Mode, line: bytes, now: Ns) -> Before:
+    def before_line(self, command: Command | None, now: Ns) -> Before:
         """A line is about to be obeyed."""
         self.happened(now)
         commands = self.node.commands
         queue = commands.queue
-        command = parse_in(mode, line).command
         endless = isinstance(command, Move) and not command.steps
         if endless or isinstance(command, Stop | Next | RunPosition | ThrowAway | SystemCommand):
             self.disturb()
@@ -291,11 +313,8 @@ class Ledger:
         self._look(now)
         self._check(now)
         self._check_rows(before, moved)
-        if isinstance(command, Stop) and not command.grace or isinstance(command, SystemCommand):
-            assert commands.current is None
-            assert commands.held is None
-            assert not commands.pending
-            assert not commands.looping
+        if command == Stop(grace=False) or isinstance(command, SystemCommand):
+            self.stands()
         elif isinstance(command, Move) and moved is not None and before.idle and not before.barred:
             assert moved in (commands.current, commands.held)
 
@@ -320,8 +339,14 @@ class Ledger:
                 self.session = session.with_full_step(full_step=full_step)
             case ToggleStepMode():
                 self.session = session.with_full_step(full_step=not session.full_step)
+            case SendSoftOps(on):
+                self.soft_ops = on
+            case SendAcks(on):
+                self.acks = on
+            case SendCrcs(on):
+                self.crcs = on
             case Reboot():
-                self.session = Session.start(self.node.eeprom.defaults())
+                self._begin_session()
             case _:
                 pass
         return None
@@ -357,7 +382,7 @@ class Ledger:
         if destination == GENERAL_CALL:
             return
         self.last_source = source
-        if self.node.network.ack:
+        if self.acks:
             self.owed[ack(source, self.node.address)] += 1
 
     def may_refuse(self, packets: int) -> None:
@@ -375,7 +400,7 @@ class Ledger:
         self.owed[data] -= 1
 
     def _packet(self, to: int, body: bytes) -> bytes:
-        return encode(to, self.node.address, body, crc=self.node.network.crc)
+        return encode(to, self.node.address, body, crc=bool(self.crcs))
 
     def _see_whether_astray(self, now: Ns) -> None:
         node = self.node
