@@ -336,8 +336,12 @@ class Medium:
         if passage.end is not None:
             sent.end = passage.end
         if not passage.silent:
+            pieces = passage.pieces()
+            if pieces:
+                # The line is taken until the last byte has arrived, however late it is.
+                sent.end = max(sent.end, pieces[-1].end)
             self._occupy(sent, passage, collides=collides)
-            for piece in passage.pieces():
+            for piece in pieces:
                 self._send_piece(piece, passage, passage.reaches)
             for address, rate in passage.receivers.items():
                 for piece in passage.as_read_at(rate).pieces(rate):
@@ -355,7 +359,6 @@ class Medium:
         counters.transmissions += 1
         counters.bytes += len(sent.data)
         counters.busy += sent.end - sent.start
-        counters.collided += sent.collided
         if collides:
             place.active = [other for other in place.active if other.end > sent.start]
             for other in place.active:
