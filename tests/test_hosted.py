@@ -41,6 +41,7 @@ def test_a_fault_is_put_on_and_taken_off_in_real_time() -> None:
         runner.run(_scene())
 
 
+@pytest.mark.slow
 def test_what_a_fault_wants_to_say_by_itself_is_said_in_real_time() -> None:
     async def main() -> None:
         async with open_bus(Configuration(nodes=(10,))) as bus:

@@ -56,6 +56,7 @@ class Line:
         return bytes(byte for _, byte in self.heard[count:])
 
 
+@pytest.mark.slow
 @given(st.binary(min_size=1, max_size=50), st.floats(1e-3, 1), st.integers(0, 9))
 def test_bit_errors_count_exactly_the_bits_that_differ(data: bytes, rate: float, seed: int) -> None:
     line = Line(BitErrors(rate), seed=seed)
@@ -77,6 +78,7 @@ def test_every_data_bit_is_as_likely_to_be_inverted_and_the_ninth_is_one_of_them
     assert outcome == line.ninth
 
 
+@pytest.mark.slow
 @given(st.binary(min_size=1, max_size=80), st.integers(0, 9))
 def test_what_is_dropped_leaves_a_gap_and_the_rest_comes_when_it_would_have(
     data: bytes, seed: int
@@ -91,6 +93,7 @@ def test_what_is_dropped_leaves_a_gap_and_the_rest_comes_when_it_would_have(
     assert line.ons[0].count == len(data) - len(line.heard)
 
 
+@pytest.mark.slow
 @given(st.integers(1, 80), st.integers(0, 9))
 def test_what_comes_twice_makes_room_for_itself(size: int, seed: int) -> None:
     line = Line(Duplicate(0.2), seed=seed)
@@ -101,6 +104,7 @@ def test_what_comes_twice_makes_room_for_itself(size: int, seed: int) -> None:
     assert all(BYTE <= one <= BYTE + 1 for one in apart)
 
 
+@pytest.mark.slow
 @given(st.integers(1, 80), st.integers(0, 9))
 def test_what_is_late_holds_up_all_behind_it_and_nothing_is_lost(size: int, seed: int) -> None:
     line = Line(Delay(0.1, 2 * MS), seed=seed)
@@ -111,6 +115,7 @@ def test_what_is_late_holds_up_all_behind_it_and_nothing_is_lost(size: int, seed
     assert sum(one > 1 for one in steps) <= line.ons[0].count
 
 
+@pytest.mark.slow
 @given(
     st.lists(
         st.sampled_from((BitErrors(0.05), Drop(0.1), Duplicate(0.1), Delay(0.1, MS))), max_size=5

@@ -34,6 +34,7 @@ def outcomes(medium: Medium, seen: list[Transmission]) -> list[bytes]:
 # ---- chance -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @given(st.floats(1e-300, 1), st.lists(st.integers(0, 500)), st.integers(0, 99))
 def test_gaps_are_the_same_however_the_things_are_cut_into_rows(
     rate: float, rows: list[int], seed: int
@@ -47,6 +48,7 @@ def test_gaps_are_the_same_however_the_things_are_cut_into_rows(
     assert found == together.among(begin)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [1e-3, 0.03, 0.5, 1])
 def test_things_are_struck_as_often_as_the_rate_says(rate: float) -> None:
     count = 200_000

@@ -147,7 +147,7 @@ def test_what_a_node_says_at_another_rate_takes_its_time_and_is_read_bit_by_bit(
     sent = medium.transmit(bench.node, b"\x55", 0)
     bench.run()
     # Twice as long, and what is read of it ends a little later yet.
-    assert 10 * SECOND // 19_200 <= sent.end < 11 * SECOND // 19_200
+    assert 10 * SECOND // 19_200 <= sent.end <= 11 * SECOND // 19_200
     assert seen[0].outcome(0) == b"\x66\xe6"
     assert b"".join(bench.answers) == b"\x66\xe6"
 

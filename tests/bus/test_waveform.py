@@ -18,11 +18,13 @@ def read(data: bytes, of: int, at: int, bits: int = 10, ninth: bytes | None = No
     return [bytes(value for _, value, _ in found), bytes(bit for _, _, bit in found)]
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=40), st.sampled_from((300, 9_600, 38_400, 115_200)))
 def test_at_the_same_rate_the_same_bytes_are_read(data: bytes, baud: int) -> None:
     assert read(data, baud, baud)[0] == data
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=40), st.integers(-40, 40))
 def test_a_rate_that_is_off_by_four_percent_at_most_is_good_enough_for_8n1(
     data: bytes, thousandths: int
@@ -30,6 +32,7 @@ def test_a_rate_that_is_off_by_four_percent_at_most_is_good_enough_for_8n1(
     assert read(data, 38_400, 38_400 * (1000 + thousandths) // 1000)[0] == data
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.integers(0, 255), st.integers(0, 1)), max_size=20))
 def test_ninth_bits_are_read_as_well(pairs: list[tuple[int, int]]) -> None:
     data, ninth = bytes(one for one, _ in pairs), bytes(bit for _, bit in pairs)
