@@ -5,7 +5,7 @@ Owns whom each keeps from hearing or makes hear otherwise, and what becomes of w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -70,7 +70,7 @@ class Cut:
     Each side hears and disturbs its own alone. Counts what somebody missed.
     """
 
-    beyond: frozenset[int]
+    beyond: Collection[int]
     name: ClassVar[str] = "cut"
 
     def put_on(self, on: FaultOn) -> Strike:

@@ -410,7 +410,7 @@ class Medium:
                 if owner is not piece.sender or (passage.echoes and passage.echoes(listener)):
                     late = passage.late(listener) if passage.late else 0
                     if late:
-                        self.kernel.at(now + late, listener.hear, heard, now + late)
+                        self.kernel.at(now + late, self._give, piece.lane, listener, heard)
                     else:
                         listener.hear(heard, now)
         if upto < size:
@@ -421,6 +421,11 @@ class Medium:
         if not passage.left:
             # Later than the last piece when the end of it was lost.
             self.kernel.at(sent.end, self._end, sent)
+
+    def _give(self, lane: int, listener: Listener, heard: Heard) -> None:
+        """Hand on what came late, unless the listener has left."""
+        if any(one is listener for _, one in self._lanes[lane].listeners):
+            listener.hear(heard, self.kernel.now)
 
     def _heard(self, piece: Transmission, first: int, upto: int) -> Heard:
         return Heard(

@@ -64,6 +64,9 @@ def test_a_dead_node_misses_broadcasts_and_its_own_packets_and_says_nothing() ->
     assert bench.answers == [ack(MOTHER, 11)]
     assert on.count == 2
     assert [list(passage(sent).missed) for sent in seen] == [[10], [10], [], []]
+    assert passage(seen[0]).heard_by(10, 0) == b""
+    assert passage(seen[0]).heard_by(11, 0) == passage(seen[0]).heard_by(EVERY_LINK, 0)
+    assert passage(seen[0]).heard_by(11, 0) == seen[0].data
     on.off()
     say(bench, 10)
     assert moved(bench) == [MOVED, 2 * MOVED]
@@ -130,6 +133,10 @@ def test_a_node_at_another_rate_obeys_nothing_and_disturbs_nobody_who_waits_for_
     assert bench.answers == [ack(MOTHER, 11)] * 3
     assert on.count == 3
     assert len(seen) == 9
+    heard = passage(seen[0]).heard_by(10, 0)
+    assert heard != seen[0].data
+    assert heard
+    assert passage(seen[0]).heard_by(11, 0) == seen[0].data
 
 
 def test_a_node_whose_rate_is_a_little_off_gets_by() -> None:
@@ -171,10 +178,15 @@ def test_only_the_link_that_is_named_hears_late() -> None:
     bench.run()
     assert heard == {"a": [sent.end + 16 * MS], "b": [sent.end]}
     assert on.count == 1
+    left = Port(medium, lambda _heard, _now: pytest.fail("it has left"), name="a")
+    medium.transmit("somebody", b"A", 0)
+    bench.kernel.run_until(bench.kernel.now + MS)
+    left.close()
+    bench.run()
     medium.add_fault(Latency(MS))
     sent = medium.transmit("somebody", b"A", 0)
     bench.run()
-    assert [times[1] - sent.end for times in heard.values()] == [17 * MS, MS]
+    assert [times[2] - sent.end for times in heard.values()] == [17 * MS, MS]
 
 
 def test_only_the_link_that_is_named_hears_itself() -> None:
