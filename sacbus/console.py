@@ -62,7 +62,11 @@ class Console:
     def type(self, keys: str | bytes) -> None:
         """Press keys, one after the other at one instant; CR ends a line."""
         data = keys.encode("latin-1") if isinstance(keys, str) else keys
-        self._host.arrive(self.press, data)
+        kernel = self._host.kernel
+        if kernel.running:
+            kernel.at(kernel.now, self.press, data)
+        else:
+            self._host.arrive(self.press, data)
 
     def read(self) -> str:
         """What has been shown since it was last read: the last :data:`KEPT` characters of it."""

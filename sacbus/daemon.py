@@ -56,14 +56,12 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
         for wanted in nodes:
             kind = kinds[wanted.kind]
             settings = settings_from(kind.settings, wanted.settings)
-            node = kind.create(wanted.address, settings, rate, bus.tell)
+            memory = None
             if state is not None:
                 memory, remark = state.load(wanted.address, kind.name)
                 if remark is not None:
                     bus.tell(Report(kernel.now, wanted.address, ReportKind.WARNING, remark))
-                if memory is not None:
-                    node.restore(memory)
-            bus.add(node)
+            bus.add(kind.create(wanted.address, settings, rate, bus.tell, memory))
         hosted = HostedBus(configuration, bus, _host(configuration, bus, loop))
         stack.callback(hosted.close)
         for place in configuration.links:

@@ -78,6 +78,10 @@ class Host(Contract):
         """Something came in from the world: bring bus time up to date, then take it in."""
         ...
 
+    def catch_up(self) -> Ns:
+        """Bring bus time up to date; what it is now."""
+        ...
+
     def spare(self) -> float:
         """Seconds of wall time until the next event that is not quiet; ``inf`` without one."""
         ...
@@ -163,6 +167,11 @@ class RealHost:
         finally:
             self._busy = False
             self._arm()
+
+    def catch_up(self) -> Ns:
+        """Bus time, up to date with the clock."""
+        self.arrive(_nothing)
+        return self.kernel.now
 
     def spare(self) -> float:
         """Seconds until the next event that is not quiet; 0 when one is due, ``inf`` without."""
@@ -364,6 +373,10 @@ class VirtualHost:
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None:
         """Bus time is up to date already."""
         callback(*arguments)
+
+    def catch_up(self) -> Ns:
+        """It always is up to date."""
+        return self.kernel.now
 
     def spare(self) -> float:
         """No event is held up by what takes no bus time."""

@@ -75,7 +75,7 @@ class Kernel:
     Times are ints, ns since the start. Benchmarked against a bare heapq loop (``make bench``).
     """
 
-    __slots__ = ("_cancelled", "_loud", "_order", "_quiet", "now", "ran")
+    __slots__ = ("_cancelled", "_loud", "_order", "_quiet", "now", "ran", "running")
 
     def __init__(self, start: Ns = 0) -> None:
         #: Heaps, each with appointments of one kind.
@@ -88,6 +88,8 @@ class Kernel:
         self.now: Ns = start
         #: Events run so far.
         self.ran = 0
+        #: Whether an event is running now: what it sets going must wait until it is over.
+        self.running = False
 
     def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Appointment:
         """Have ``callback(*arguments)`` run at ``when``; a time that has passed means now.
@@ -183,6 +185,7 @@ class Kernel:
         """
         loud, quiet = self._loud, self._quiet
         ran = 0
+        self.running = True
         try:
             while True:
                 heap = quiet if quiet and (not loud or quiet[0] < loud[0]) else loud
@@ -198,6 +201,7 @@ class Kernel:
                 ran += 1
                 callback(*appointment[3])
         finally:
+            self.running = False
             self.ran += ran
         return ran
 

@@ -25,6 +25,7 @@ __all__ = [
     "BOOT",
     "EVERYONE",
     "GROUP",
+    "OFF",
     "Decoder",
     "Heard",
     "KindError",
@@ -58,8 +59,9 @@ GROUP: Final = "sacbus.nodes"
 EVERYONE: Final = None
 
 
-#: The state of a node that has power and does not obey yet.
+#: The states of a node that has power and does not obey yet, and of one that has none.
 BOOT: Final = "BOOT"
+OFF: Final = "OFF"
 
 
 @dataclass(slots=True)
@@ -178,8 +180,12 @@ class Pins(Contract):
         """The outputs whose edges a watcher is told of; pulses are too many."""
         ...
 
+    def check(self, pin: str, level: int) -> None:
+        """PinError for what is no input, and for a level that it cannot have."""
+        ...
+
     def drive(self, pin: str, level: int, now: Ns) -> None:
-        """Drive an input. PinError for what is no input, and a level that it cannot have.
+        """Drive an input; PinError as from :meth:`check`.
 
         The owner asks the bus to touch the node afterwards (``Bus.touch``).
         """
@@ -279,10 +285,6 @@ class Node(Contract):
 
     def persist(self) -> Mapping[str, object]:
         """The contents of its EEPROM, as JSON has them. Cheap: it is asked at each change."""
-        ...
-
-    def restore(self, memory: Mapping[str, object]) -> None:
-        """Start with this EEPROM, as after a cold boot. Unknown or odd values are reported."""
         ...
 
 
@@ -439,8 +441,13 @@ class NodeKind(Contract):
         settings: Any,  # noqa: ANN401 (an instance of the kind's own settings)
         rate: LineRate,
         tell: Callable[[Report], None],
+        memory: Mapping[str, object] | None = None,
     ) -> Node:
-        """A new node with factory memory; ``tell`` takes what it reports out of band."""
+        """A new node; ``tell`` takes what it reports out of band.
+
+        ``memory`` is what its EEPROM holds, as :meth:`Node.persist` gave it; None: what it left the
+        factory with. Unknown or odd values are reported.
+        """
         ...
 
     def shape(self, stored: Mapping[str, Any]) -> object:

@@ -8,6 +8,7 @@ is the node's affair.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final, NamedTuple
 
 from sacbus.bus import Bus
@@ -77,7 +78,8 @@ class Panel:
         self._bus = bus
         self._host = host
         self._console: Console | None = None
-        self._watchers: list[Callable[[str, int, Ns], object]] = []
+        #: By what stands for each call of :meth:`watch`.
+        self._watchers: dict[object, Callable[[str, int, Ns], object]] = {}
 
     @property
     def console(self) -> Console | None:
@@ -88,15 +90,16 @@ class Panel:
 
     def snapshot(self) -> Snapshot:
         """The node as it is now."""
-        return self.node.snapshot(self._now())
+        return self.node.snapshot(self._host.catch_up())
 
     def level(self, pin: str) -> int:
         """The level of a pin now, whether it is driven or drives; xclk: Hz."""
-        return self._pins().level(pin, self._now())
+        return self._pins().level(pin, self._host.catch_up())
 
     def drive(self, pin: str, level: int) -> None:
         """Drive an input to a level now; xclk: to a frequency in Hz."""
         pins = self._pins()
+        pins.check(pin, level)
 
         def drive(now: Ns) -> None:
             pins.drive(pin, level, now)
@@ -131,25 +134,27 @@ class Panel:
 
         Which outputs are told of, the node says (``sacbus.node.Pins.told``). What is given ends it.
         """
-        self._watchers.append(watcher)
-        if len(self._watchers) == 1:
-            pins = self._pins()
-            self._do(lambda now: pins.watch(self._tell, now))
+        pins = self._pins()
+        watch = object()
 
-        def end() -> None:
-            if watcher in self._watchers:
-                self._watchers.remove(watcher)
-                if not self._watchers:
-                    self._do(lambda now: self._pins().watch(None, now))
+        def begin(now: Ns) -> None:
+            if not self._watchers:
+                pins.watch(self._tell, now)
+            self._watchers[watch] = watcher
 
-        return end
+        def stop(now: Ns) -> None:
+            if self._watchers.pop(watch, None) is not None and not self._watchers:
+                pins.watch(None, now)
+
+        self._do(begin)
+        return partial(self._do, stop)
 
     def _done(self, deed: Deed) -> None:
         for watcher in self._deeds:
             watcher(self.node, deed)
 
     def _tell(self, pin: str, level: int, when: Ns) -> None:
-        for watcher in tuple(self._watchers):
+        for watcher in tuple(self._watchers.values()):
             watcher(pin, level, when)
 
     def _pins(self) -> Pins:
@@ -158,17 +163,16 @@ class Panel:
             raise PinError(f"node {self.node.address} has no pins")
         return pins
 
-    def _now(self) -> Ns:
-        self._host.arrive(_nothing)
-        return self._host.kernel.now
-
     def _do(self, deed: Callable[[Ns], object]) -> None:
+        kernel = self._host.kernel
+
         def done() -> None:
-            deed(self._host.kernel.now)
+            deed(kernel.now)
             self._bus.touch(self.node)
 
-        self._host.arrive(done)
-
-
-def _nothing() -> None:
-    """What is done to bring bus time up to date."""
+        if kernel.running:
+            # From within an event, which is finished first: whoever watches sees one thing at a
+            # time, in virtual time as in real time.
+            kernel.at(kernel.now, done)
+        else:
+            self._host.arrive(done)

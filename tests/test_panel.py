@@ -131,3 +131,61 @@ def test_in_real_time_a_pin_acts_at_the_time_that_it_is() -> None:
 
     with asyncio.Runner(loop_factory=real_loop) as runner:
         runner.run(main())
+
+
+def test_who_acts_on_what_is_told_acts_after_it() -> None:
+    async def play(bus: HostedBus) -> None:
+        panel = bus.panel(10)
+        told: list[tuple[str, int]] = []
+
+        def stop(pin: str, level: int, _when: Ns) -> None:
+            told.append((pin, level))
+            if (pin, level) == ("op_sa", 1):
+                panel.drive("estop", 0)
+
+        panel.watch(stop)
+        await bus.mother().send(10, "m50v100")
+        await asyncio.sleep(1)
+        assert told == [("op_sa", 1), ("op_sb", 0), ("op_sa", 0), ("op_sb", 1)]
+        assert panel.level("op_sb") == 1
+        assert panel.snapshot().position_pulses == 1
+
+    virtually(play)
+
+
+def test_a_pin_that_is_not_there_is_refused_to_who_asks_also_while_edges_are_told() -> None:
+    async def play(bus: HostedBus) -> None:
+        panel = bus.panel(10)
+        refused: list[str] = []
+
+        def wrong(_pin: str, _level: int, _when: Ns) -> None:
+            try:
+                panel.drive("pwm", 1)
+            except PinError as fault:
+                refused.append(str(fault))
+
+        panel.watch(wrong)
+        await bus.mother().send(10, "m2v10")
+        await asyncio.sleep(1)
+        assert len(refused) == 4
+
+    virtually(play)
+
+
+def test_who_watches_twice_is_told_twice_and_ends_each_by_itself() -> None:
+    async def play(bus: HostedBus) -> None:
+        panel = bus.panel(10)
+        told: list[str] = []
+
+        def watcher(pin: str, _level: int, _when: Ns) -> None:
+            told.append(pin)
+
+        end = panel.watch(watcher)
+        panel.watch(watcher)
+        end()
+        end()
+        await bus.mother().send(10, "m2v10")
+        await asyncio.sleep(1)
+        assert told == ["op_sa", "op_sb"] * 2
+
+    virtually(play)

@@ -25,10 +25,15 @@ class SacKind:
     settings = SacSettings
 
     def create(
-        self, address: int, settings: SacSettings, rate: LineRate, tell: Callable[[Report], None]
+        self,
+        address: int,
+        settings: SacSettings,
+        rate: LineRate,
+        tell: Callable[[Report], None],
+        memory: Mapping[str, object] | None = None,
     ) -> SacNode:
-        """A node with factory memory at ``address``."""
-        return SacNode(address, settings, rate, tell)
+        """A node at ``address``, with factory memory if there is none that was stored."""
+        return SacNode(address, settings, rate, tell, memory)
 
     def shape(self, stored: Mapping[str, Any]) -> SacShape:
         """Profile and board of segments of motion."""

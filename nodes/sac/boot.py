@@ -16,7 +16,7 @@ from typing import Final
 
 from sacbus.kernel import SECOND, Ns
 
-__all__ = ["LISTENS", "OFF", "VERSION_LINE", "Start"]
+__all__ = ["LISTENS", "NO_POWER", "VERSION_LINE", "Start"]
 
 #: How long a key restores the factory's memory (manual: "approximately a one second delay").
 LISTENS: Final[Ns] = SECOND
@@ -26,7 +26,7 @@ VERSION_LINE: Final = "SAC v1.0"
 
 
 class Start:
-    """A boot that is under way. ``over``: when it is over; None: the power is off.
+    """What keeps a node from obeying: a boot, until it is ``over``, or (None) that power is off.
 
     A cold one ``listens``: a key restores the factory's memory.
     """
@@ -41,9 +41,10 @@ class Start:
 
     def key(self) -> bool:
         """A key has come on the terminal; False when it is an ordinary one."""
-        self.restores = self.restores or self.listens
+        if self.listens:
+            self.restores = True
         return self.listens or self.over is None
 
 
-#: No power: nothing starts, and keys come to nobody.
-OFF: Final = Start(None)
+#: Nothing starts, and keys come to nobody. One for all nodes, since nothing in it changes.
+NO_POWER: Final = Start(None)

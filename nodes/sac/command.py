@@ -179,9 +179,9 @@ class CommandProcessor:
         self._run.set_clock(clock, now)
         self._run.see_what_is_due()
 
-    def switch_ops(self, *, on: bool) -> None:
-        """Have the starts and ends of commands told, or no longer."""
-        self._run.switch_ops(on=on)
+    def switch_ops(self, *, on: bool, now: Ns) -> None:
+        """Have the starts and ends of commands told from ``now`` on, or no longer."""
+        self._run.switch_ops(on=on, now=now)
         self._run.see_what_is_due()
 
     def bar(self, *, barred: bool, now: Ns) -> None:
@@ -277,6 +277,8 @@ class CommandProcessor:
         now: Ns,
     ) -> None:
         loop = self._looping()
+        if not loop.running:
+            self._run.forget_warnings()
         match command:
             case LoopStart(position):
                 if not loop.start_at(position):
@@ -326,26 +328,28 @@ class CommandProcessor:
 
     def _go_before(self, motion: Motion, source: Source, now: Ns) -> None:
         """Have a command run as soon as what it cuts has ended."""
-        self._put_held_back()
+        self._put_back(now)
         self._preempting = motion
         self._preempting_source = source
         if not self._run.stopping:  # what comes while the motor slows down waits for that
             self._obey(Cue.CONTINUOUS if source is Source.CONTINUOUS else Cue.ONCE, now)
         self._load_next(now)
 
-    def _put_held_back(self) -> None:
-        """What is held goes back to where it came from, to be held again; if there is room."""
-        run = self._run
-        held, source = run.held, run.source
-        if held is None:
+    def _put_back(self, now: Ns) -> None:
+        """What is held, or waits for its start, goes back to where it came from; if there is room.
+
+        It has not begun, so it is the next one after what goes before it.
+        """
+        taken = self._run.take_back(now)
+        if taken is None:
             return
-        position = run.drop_held()
+        motion, source, position = taken
         if source is Source.LOOP:
             self._looping().again()
         elif source is Source.QUEUE and position is not None and not self.queue.put_back(position):
             self._told.tell_of_command(
                 ReportKind.OVERRUN,
-                f"{shortest(held, self.session.defaults)} was held, and is overwritten",
+                f"{shortest(motion, self.session.defaults)} had not begun, and is overwritten",
             )
 
     def _load_next(self, now: Ns) -> None:

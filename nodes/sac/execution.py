@@ -8,8 +8,9 @@ Source: manual, "GAP", "sync", "T/t start wait", "ops/soft_ops"; spec, motion.
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from functools import lru_cache
-from typing import Protocol
+from typing import Final, Protocol
 
 from nodes.sac.engine import Engine
 from nodes.sac.order import Source
@@ -28,6 +29,9 @@ from sacbus.motion import (
 from sacbus.node import ReportKind
 
 __all__ = ["Execution", "Told", "shortest"]
+
+
+_NOTHING: Final[AbstractSet[Motion]] = frozenset()
 
 
 class Told(Protocol):
@@ -52,14 +56,15 @@ class Execution:
         "_drive",
         "_engine",
         "_free",
-        "_held_at",
         "_held_loaded",
         "_kept_rpm",
         "_last",
         "_last_end",
         "_last_period",
+        "_position",
         "_told",
         "_untold",
+        "_warned",
         "current",
         "defaults",
         "due",
@@ -83,9 +88,9 @@ class Execution:
         self.current: Motion | None = None
         self.held: Motion | None = None
         self._held_loaded: Ns = 0
-        #: Where either comes from, and the queue position of the held one if it has one.
+        #: Where either comes from, and its queue position if it has one.
         self.source = Source.STANDBY
-        self._held_at: int | None = None
+        self._position: int | None = None
         #: Whether what runs is on its way to a stop: then nothing of its velocity is kept.
         self.stopping = False
         #: Whether a velocity is kept only through a gap that is short (G toggles it).
@@ -97,6 +102,8 @@ class Execution:
         self._last_period = 0
         #: The command that was loaded last.
         self._last: Motion | None = None
+        #: Commands of the present loop that have been warned of.
+        self._warned: AbstractSet[Motion] = _NOTHING
         #: When the command that runs is over, or its start is to be told; None: never.
         self.due: Ns | None = None
 
@@ -105,16 +112,20 @@ class Execution:
         """Whether no command runs, waits or is held."""
         return self.current is None and self.held is None
 
+    def waits(self, now: Ns) -> bool:
+        """Whether a command is loaded whose first pulse is to come."""
+        return self.current is not None and not self._engine.begun(now)
+
     @property
     def profile(self) -> Profile | None:
         """That of the command that runs or waits for its start."""
         return self._engine.profile
 
-    def switch_ops(self, *, on: bool) -> None:
-        """Have the starts and ends of commands told, or no longer."""
-        self.tells_ops = on
-        if not on:
-            self._untold = False
+    def switch_ops(self, *, on: bool, now: Ns) -> None:
+        """Have the starts and ends of commands told from ``now`` on, or no longer."""
+        if on != self.tells_ops:
+            self.tells_ops = on
+            self._untold = on and self.waits(now)
 
     def reboot(self, drive: Drive, defaults: Defaults, now: Ns) -> None:
         """Go on with other parameters, at rest. Nothing may run or be held."""
@@ -144,9 +155,9 @@ class Execution:
         self._last = motion
         self.source = source
         loaded = max(now, self._free) + load
+        self._position = position
         if motion.sync:
             self.held = motion
-            self._held_at = position
             self._held_loaded = loaded
         else:
             self._launch(motion, loaded, was_waiting=now <= self._last_end)
@@ -159,13 +170,27 @@ class Execution:
             # It was loaded while it was held: nodes that one broadcast releases start together.
             self._launch(held, max(now, self._held_loaded), was_waiting=False)
 
-    def drop_held(self) -> int | None:
-        """Hold nothing any more; the queue position of what was held, if it has one."""
-        if self.held is None:
+    def drop_held(self) -> None:
+        """Hold nothing any more."""
+        if self.held is not None:
+            self.held = None
+            self.source = Source.STANDBY
+
+    def take_back(self, now: Ns) -> tuple[Motion, Source, int | None] | None:
+        """Give back what is loaded and has not begun: held at sync, or in its start wait.
+
+        The command, where it came from, and its queue position if it has one.
+        """
+        motion = self.held
+        if motion is None and self.waits(now):
+            motion = self.current
+        if motion is None:
             return None
-        self.held = None
-        self.source = Source.STANDBY
-        return self._held_at
+        source = self.source
+        self.drop_held()
+        if self.current is not None:
+            self._drop_unstarted()
+        return motion, source, self._position
 
     def _launch(self, motion: Motion, ready: Ns, *, was_waiting: bool) -> None:
         """Plan a command that may start at ``ready``, and start it after its start wait.
@@ -197,8 +222,16 @@ class Execution:
         self._untold = self.tells_ops
 
     def warn(self, profile: Profile) -> None:
-        """Report what a profile asks of the hardware that it cannot give."""
-        for warning in profile.warnings:
+        """Report what a profile asks of the hardware that it cannot give.
+
+        Of a command that comes again and again in a loop once only: the rest would be drowned.
+        """
+        warnings = profile.warnings
+        if warnings and self.source is Source.LOOP:
+            if profile.motion in self._warned:
+                return
+            self._warned = {*self._warned, profile.motion}
+        for warning in warnings:
             self._told.tell_of_command(
                 ReportKind.WARNING, str(warning), shortest(profile.motion, self.defaults)
             )
@@ -248,6 +281,10 @@ class Execution:
             self._engine.change(lambda profile, at: profile.retarget(at, motion), now)
         if self._engine.profile is not None:
             self.warn(self._engine.profile)
+
+    def forget_warnings(self) -> None:
+        """Warn of commands in loops anew: another loop has begun."""
+        self._warned = _NOTHING
 
     def forget_velocity(self) -> None:
         """Whatever comes next begins from rest."""

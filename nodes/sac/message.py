@@ -71,19 +71,13 @@ _SCREENS: Final[Mapping[Mode, Query]] = {
 
 
 class MessageProcessor:
-    """Lines in. ``terminal`` is None until somebody has asked for the port."""
+    """Lines in; ``board`` is what they reach of a node."""
 
-    __slots__ = ("_board", "_commands", "_line", "last_source", "terminal")
+    __slots__ = ("_board", "_commands", "_line", "last_source")
 
-    def __init__(
-        self,
-        commands: CommandProcessor,
-        board: Board,
-        terminal: TerminalPort | None = None,
-    ) -> None:
+    def __init__(self, commands: CommandProcessor, board: Board) -> None:
         self._board = board
         self._commands = commands
-        self.terminal = terminal
         #: Who sent the last packet that was not a general call; ``/`` answers there.
         self.last_source = GENERAL_CALL
         self._line = b""
@@ -159,17 +153,19 @@ class MessageProcessor:
     def _send_on(self, forward: Forward, now: Ns) -> None:
         to = self.last_source if forward.destination is None else forward.destination
         self._board.network.send(to, forward.rest.encode("latin-1"), now)
-        if self.terminal is not None:
-            self.terminal.print((f"{to}> {forward.rest}",))
+        terminal = self._board.terminal_port
+        if terminal is not None:
+            terminal.print((f"{to}> {forward.rest}",))
 
     def _show_message(self, text: str) -> None:
         self._board.tell(ReportKind.MESSAGE, text, self.line, 0)
-        if self.terminal is not None:
-            self.terminal.print((text,))
+        terminal = self._board.terminal_port
+        if terminal is not None:
+            terminal.print((text,))
 
     def _answer(self, query: Query) -> None:
         """It prints on the terminal alone (spec, "Two ports"); the network hears nothing."""
-        terminal = self.terminal
+        terminal = self._board.terminal_port
         if terminal is None or not self._board.watched:
             self._ignored("a query is answered on the terminal only, and nobody is there")
         else:

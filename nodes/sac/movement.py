@@ -20,6 +20,7 @@ import numpy as np
 from nodes.sac.command import CommandProcessor, shortest
 from nodes.sac.engine import FROM_REST, Engine, Standing, Where
 from nodes.sac.memory import Memory
+from nodes.sac.pins import TOLD
 from sacbus.kernel import Ns
 from sacbus.language import Defaults, Motion
 from sacbus.motion import Drive, Entry, Profile, Rpm, State, Timebase, plan
@@ -27,6 +28,7 @@ from sacbus.motion.legs import Leg
 from sacbus.motion.profile import WINDOW_END
 from sacbus.motion.stored import profile_from, store_profile
 from sacbus.movement import Watcher
+from sacbus.node import OFF
 
 if TYPE_CHECKING:
     from sacbus.movement import Times
@@ -333,6 +335,8 @@ class SacSegment:
 
     def levels(self, at: Ns) -> Mapping[str, int]:
         """Levels of dir, the op pins and the driver's, as the pins have them."""
+        if self._word == OFF:
+            return dict.fromkeys(TOLD, 0)
         board, engine = self._board, self._engine
         runs = int(self._runs(at)) if board.ops else 0
         return {

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from nodes.sac.boot import LISTENS, OFF, VERSION_LINE, Start
+from nodes.sac.boot import LISTENS, NO_POWER, VERSION_LINE, Start
 from nodes.sac.command import CommandProcessor, shortest
 from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
@@ -16,7 +16,7 @@ from nodes.sac.message import MessageProcessor
 from nodes.sac.movement import SacMovement
 from nodes.sac.network import NetworkPort
 from nodes.sac.pins import SacPins
-from nodes.sac.ports import Exchanged, HardwarePort, understand
+from nodes.sac.ports import HardwarePort, Ports, understand
 from nodes.sac.queries import Query, answer
 from nodes.sac.screens import Flags
 from nodes.sac.settings import SacSettings
@@ -24,7 +24,7 @@ from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import LineRate, Ns
 from sacbus.language import Session, Stop
 from sacbus.motion import Drive, Timebase
-from sacbus.node import BOOT, Heard, Report, ReportKind, Snapshot
+from sacbus.node import BOOT, OFF, Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
 __all__ = ["SacNode"]
@@ -42,41 +42,43 @@ class SacNode:
         "_commands",
         "_configured",
         "_engine",
-        "_exchanged",
-        "_hardware",
         "_memory",
         "_messages",
         "_movement",
         "_network",
-        "_now",
         "_onlookers",
         "_pins",
+        "_ports",
         "_rate",
         "_settings",
         "_start",
         "_tell_bus",
-        "_terminal",
         "eeprom",
         "memory_changed",
         "microstep_pins",
+        "now",
         "soft_ops",
         "throttles",
         "xclk_hz",
     )
 
     def __init__(
-        self, address: int, settings: SacSettings, rate: LineRate, tell: Callable[[Report], None]
+        self,
+        address: int,
+        settings: SacSettings,
+        rate: LineRate,
+        tell: Callable[[Report], None],
+        memory: Mapping[str, object] | None = None,
     ) -> None:
+        """``memory`` is what its EEPROM holds; None: what it left the factory with."""
         self._configured = address
         self._settings = settings
         self._rate = rate
         self._tell_bus = tell
-        self._now: Ns = 0
-        #: Both made when they are first asked for: most nodes never have a user there.
-        self._terminal: TerminalPort | None = None
-        self._hardware: HardwarePort | None = None
-        #: While the two ports have each other's role.
-        self._exchanged: Exchanged | None = None
+        #: When something was last done to it, or it did something.
+        self.now: Ns = 0
+        #: Made when it is first needed: most nodes have nobody at their terminal.
+        self._ports: Ports | None = None
         #: Frequency of the clock at the xclk pin.
         self.xclk_hz = settings.xclk_hz
         self._pins: SacPins | None = None
@@ -87,9 +89,12 @@ class SacNode:
         self.memory_changed: Callable[[], None] | None = None
         #: What the EEPROM holds; what the node obeys is what it held at the last boot.
         self.eeprom = self._factory_memory()
+        remarks = [] if memory is None else self._take_stored(memory)
         #: The boot that is under way; None most of a node's life.
         self._start: Start | None = None
         self._boot(0, cold=settings.boot == "cold")
+        for remark in remarks:
+            tell(Report(0, address, ReportKind.WARNING, remark))
 
     def _factory_memory(self) -> Memory:
         return self._settings.factory_memory(self._configured, self._rate.baud)
@@ -106,7 +111,7 @@ class SacNode:
         if self._pins is not None and not self._pins.estop:
             self._commands.bar(barred=True, now=now)
         self._network = NetworkPort(self._settings, self._rate, self)
-        self._messages = MessageProcessor(self._commands, self, self._terminal)
+        self._messages = MessageProcessor(self._commands, self)
         #: Levels of MS3 MS2 MS1, bits 2 to 0: low until a driver's table says otherwise.
         self.microstep_pins = 0
         self._set_up_ports()
@@ -114,8 +119,8 @@ class SacNode:
         if cold:
             self._network.listen_from(now + LISTENS)
             self._start = Start(now + LISTENS, listens=True)
-            if self._terminal is not None:
-                self._terminal.boot(VERSION_LINE)
+            if self._ports is not None:
+                self._ports.terminal.boot(VERSION_LINE)
         else:
             self._start = Start(now) if memory.autorun else None
 
@@ -127,20 +132,21 @@ class SacNode:
     @property
     def receiving(self) -> bool:
         """True while its receiver stands open."""
-        return self._network.receiving or self._exchanged is not None
+        return self._network.receiving or (self._ports is not None and self._ports.exchanged)
 
     @property
     def quiet(self) -> bool:
         """True while it has nothing to send, and nobody is to be told of starts and ends."""
-        return self._network.due is None and not self._commands.tells_ops and self._start is None
+        return self._sends_at() is None and not self._commands.tells_ops and self._start is None
 
     def hear(self, heard: Heard, now: Ns) -> None:
         """Bytes from the line."""
-        self._now = now
-        if self._exchanged is None:
+        self.now = now
+        keys = None if self._ports is None else self._ports.keys(heard)
+        if keys is None:
             self._network.hear(heard)
         else:
-            self.terminal_keys(self._exchanged.keys(heard), now)
+            self._terminal_keys(keys, now)
         if self._onlookers:
             self.look(now)
 
@@ -148,30 +154,26 @@ class SacNode:
         """The next answer or packet to send, the end of the command that runs, or of a boot."""
         if self._start is not None:
             return self._start.over
-        sends = self._network.due
-        if self._exchanged is not None:
-            says = self._exchanged.due
-            if says is not None and (sends is None or says < sends):
-                sends = says
+        sends = self._sends_at()
         ends = self._commands.due
         if sends is None:
             return ends
         return sends if ends is None or sends < ends else ends
 
+    def _sends_at(self) -> Ns | None:
+        due = self._network.due
+        return due if self._ports is None else self._ports.due(due)
+
     def wake(self, now: Ns) -> bytes | None:
         """End what is over; send what is due."""
-        self._now = now
+        self.now = now
         if self._start is not None:
             self._end_boot(self._start, now)
         self._commands.wake(now)
         if self._onlookers:
             self.look(now)
         data = self._network.wake(now)
-        if self._exchanged is None:
-            return data
-        if data and self._hardware is not None and self._hardware.show is not None:
-            self._hardware.show(data)
-        return self._exchanged.say(now)
+        return data if self._ports is None else self._ports.say(data, now)
 
     def state(self, now: Ns) -> str:
         """What the engine does; SYNC while a command is held that has not begun; OFF; BOOT."""
@@ -207,20 +209,20 @@ class SacNode:
         """The EEPROM's contents."""
         return self.eeprom.stored()
 
-    def restore(self, memory: Mapping[str, object]) -> None:
-        """Boot with a stored EEPROM; the stored d_id wins over the configured address."""
+    def _take_stored(self, memory: Mapping[str, object]) -> list[str]:
+        """Have the EEPROM hold what was stored; sentences about what was not taken as it stood.
+
+        Settings that were given win over it, and the stored d_id over the configured address.
+        """
         asked = self._settings.asked_for()
         kept = {name: value for name, value in memory.items() if name not in asked}
-        self.eeprom, remarks = self._factory_memory().restored(kept)
-        for remark in remarks:
-            self.tell(ReportKind.WARNING, remark)
+        self.eeprom, remarks = self.eeprom.restored(kept)
         if self.eeprom.d_id != self._configured:
-            self.tell(
-                ReportKind.WARNING,
+            remarks.append(
                 f"EEPROM: d_id {self.eeprom.d_id} is stored and wins over the configured "
-                f"{self._configured}",
+                f"{self._configured}"
             )
-        self._boot(self._now, cold=self._settings.boot == "cold")
+        return remarks
 
     def write(self, memory: Memory) -> None:
         """Put this into the EEPROM; it is obeyed after the next boot."""
@@ -238,15 +240,15 @@ class SacNode:
         Off, it does nothing and forgets all but its EEPROM, also where its motor stands. Whoever
         calls this from outside the bus has the bus ask the node anew when it wants to be woken.
         """
-        self._now = now
-        if on is not (self._start is OFF):
+        self.now = now
+        if on is not (self._start is NO_POWER):
             return
         if on:
             self._boot(now, cold=True)
         else:
             self._commands.execute(Stop(grace=False), now)
             self._network.listen_from(None)
-            self._start = OFF
+            self._start = NO_POWER
         if self._onlookers:
             self.look(now)
 
@@ -289,6 +291,10 @@ class SacNode:
         if start.restores or (start.listens and reset):
             self.write(self._factory_memory())
             self._boot(now, cold=False)
+            self.tell(
+                ReportKind.WARNING,
+                "factory restore: its EEPROM is as configured again, the saved queue is gone",
+            )
         self._start = None
         if start.listens:
             self._show_prompt()
@@ -296,8 +302,8 @@ class SacNode:
             self._commands.autorun(self._memory.autorun, now)
 
     def _show_prompt(self) -> None:
-        if self._terminal is not None:
-            self._terminal.restart()
+        if self._ports is not None:
+            self._ports.terminal.restart()
 
     def _drive(self) -> Drive:
         settings = self._settings
@@ -330,6 +336,11 @@ class SacNode:
         return self._memory
 
     @property
+    def powered(self) -> bool:
+        """Whether it is switched on."""
+        return self._start is not NO_POWER
+
+    @property
     def booted(self) -> bool:
         """Whether it runs: switched on, and its boot is over."""
         return self._start is None
@@ -339,7 +350,7 @@ class SacNode:
         """OFF or BOOT; empty while it runs."""
         if self._start is None:
             return ""
-        return "OFF" if self._start is OFF else BOOT
+        return OFF if self._start is NO_POWER else BOOT
 
     # ---- the ports ----
 
@@ -347,68 +358,64 @@ class SacNode:
         """Give the two ports their roles and rates."""
         memory, line = self._memory, self._rate
         hears = understand(memory.sw, line.baud)
+        if memory.network:
+            rate = LineRate(memory.hw, line.bits)
+            self._network.set_up(memory, rate)
+            self._ports_made().exchange(rate, line, hears=hears)
+        else:
+            self._network.set_up(memory, line, garbles=not hears)
+            if self._ports is not None:
+                self._ports.put_back()
         if not hears:
             self.tell(
                 ReportKind.WARNING,
                 f"sw is {memory.sw} baud, the line runs at {line.baud}: it hears nothing, and "
                 "nobody understands it",
             )
-        if memory.network:
-            rate = LineRate(memory.hw, line.bits)
-            self._network.set_up(memory, rate)
-            self._exchanged = Exchanged(self._network, rate, line, hears=hears)
-        else:
-            self._network.set_up(memory, line, garbles=not hears)
-            self._exchanged = None
+
+    def _ports_made(self) -> Ports:
+        if self._ports is None:
+            self._ports = Ports(self)
+        return self._ports
 
     @property
     def terminal(self) -> HardwarePort:
         """Its hardware port, where its terminal is (``ports.py``)."""
-        if self._hardware is None:
-            self._hardware = HardwarePort(self)
-            self._terminal_port()
-        return self._hardware
+        return self._ports_made().hardware
 
-    def hardware_keys(self, keys: bytes, now: Ns) -> None:
-        """Bytes arrive at the hardware port."""
-        if self._exchanged is None:
-            self.terminal_keys(keys, now)
-            return
-        self._now = now
-        self._exchanged.hear(keys, now)
-        if self._onlookers:
-            self.look(now)
-
-    def terminal_keys(self, keys: bytes, now: Ns) -> None:
-        """Keys arrive at the terminal, on whichever port; a boot under way takes them all."""
-        self._now = now
-        if keys and (self._start is None or not self._start.key()):
-            self._terminal_port().take(keys, now)
-        if self._onlookers:
-            self.look(now)
-
-    def show(self, text: bytes) -> None:
-        """What the terminal prints."""
-        if self._exchanged is not None:
-            self._exchanged.print(text)
-        elif self._hardware is not None and self._hardware.show is not None:
-            self._hardware.show(text)
+    @property
+    def terminal_port(self) -> TerminalPort | None:
+        """Its terminal; None as long as nobody has asked for it."""
+        return None if self._ports is None else self._ports.terminal
 
     @property
     def watched(self) -> bool:
         """Whether anybody is at the far end of the terminal."""
-        if self._exchanged is not None:
-            return self._exchanged.hears
-        return self._hardware is not None and self._hardware.show is not None
+        return self._ports is not None and self._ports.watched
 
-    def _terminal_port(self) -> TerminalPort:
-        if self._terminal is None:
-            self._terminal = self._messages.terminal = TerminalPort(self)
-        return self._terminal
+    def hardware_keys(self, keys: bytes, now: Ns) -> None:
+        """Bytes arrive at the hardware port."""
+        self.now = now
+        packets = self._ports_made().packets(keys, now)
+        if packets is None:
+            self._terminal_keys(keys, now)
+        else:
+            self._network.hear(packets)
+        if self._onlookers:
+            self.look(now)
+
+    def _terminal_keys(self, keys: bytes, now: Ns) -> None:
+        """Keys arrive at the terminal, on whichever port; a boot under way takes them all."""
+        if keys and (self._start is None or not self._start.key()):
+            self._ports_made().terminal.take(keys, now)
+
+    def show(self, text: bytes) -> None:
+        """What the terminal prints."""
+        self._ports_made().show(text)
 
     def line_typed(self, line: bytes, now: Ns) -> None:
         """A line was typed at the terminal port."""
-        self._messages.terminal_line(line, self._terminal_port(), now)
+        self._messages.terminal_line(line, self._ports_made().terminal, now)
 
     def answer(self, query: Query) -> list[str]:
         """What a query shows on the terminal."""
@@ -456,7 +463,7 @@ class SacNode:
     def watch_ops(self) -> None:
         """See anew whether anybody is to be told of starts and ends of commands."""
         watched = self._pins is not None and self._pins.watched
-        self._commands.switch_ops(on=self.soft_ops or watched)
+        self._commands.switch_ops(on=self.soft_ops or watched, now=self.now)
 
     def feed_xclk(self, hz: int, now: Ns) -> None:
         """From ``now`` on a clock of ``hz`` comes to the xclk pin; 0: no edges.
@@ -464,7 +471,7 @@ class SacNode:
         It matters while the node is set to the external clock. Whoever calls this from outside the
         bus has the bus ask the node anew when it wants to be woken.
         """
-        self._now = now
+        self.now = now
         self.xclk_hz = hz
         clock = self._external_clock()
         if clock is not None:
@@ -493,4 +500,4 @@ class SacNode:
 
     def tell(self, kind: ReportKind, text: str, line: str = "", column: int = 0) -> None:
         """Report something, now."""
-        self._tell_bus(Report(self._now, self.address, kind, text, line, column))
+        self._tell_bus(Report(self.now, self.address, kind, text, line, column))

@@ -22,6 +22,7 @@ from nodes.sac.encoder import Encoder
 from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.network import NetworkPort
+from nodes.sac.settings import FASTEST_XCLK
 from sacbus.kernel import Ns
 from sacbus.language import ReleaseSync
 from sacbus.node import PinError
@@ -34,21 +35,24 @@ OUTPUTS: Final = ("clk", "dir", "ms1", "ms2", "ms3", "op_sa", "op_sb", "tx_en", 
 #: Outputs whose edges are told. clk and 1MHz have too many, and tx_en is seen on the line.
 TOLD: Final = ("dir", "ms1", "ms2", "ms3", "op_sa", "op_sb")
 
-#: Hz; what the setting ``xclk_hz`` takes at most, too.
-FASTEST_XCLK: Final = 20_000_000
-
 
 class Wired(Protocol):
     """The node that the pins belong to."""
 
     @property
-    def commands(self) -> CommandProcessor: ...
+    def commands(self) -> CommandProcessor:
+        """Its command processor."""
+        ...
 
     @property
-    def network(self) -> NetworkPort: ...
+    def network(self) -> NetworkPort:
+        """Its network port."""
+        ...
 
     @property
-    def engine(self) -> Engine: ...
+    def engine(self) -> Engine:
+        """Its motion engine."""
+        ...
 
     @property
     def obeyed(self) -> Memory:
@@ -61,6 +65,11 @@ class Wired(Protocol):
         ...
 
     @property
+    def powered(self) -> bool:
+        """Whether it is switched on; else its outputs are low."""
+        ...
+
+    @property
     def booted(self) -> bool:
         """Whether it runs: switched on, and its boot is over."""
         ...
@@ -69,6 +78,8 @@ class Wired(Protocol):
     throttles: bool
     #: Frequency of the clock at xclk.
     xclk_hz: int
+    #: When something was last done to it.
+    now: Ns
 
     def feed_xclk(self, hz: int, now: Ns) -> None:
         """Have a clock of that frequency there."""
@@ -105,22 +116,24 @@ class SacPins:
 
     # ---- inputs ----
 
-    def drive(self, pin: str, level: int, now: Ns) -> None:
-        """Drive an input to 0 or 1, or xclk with a clock of so many Hz.
-
-        PinError for a pin that is no input, and for a level that it cannot have.
-        """
+    def check(self, pin: str, level: int) -> None:
+        """PinError for a pin that is no input, and for a level that it cannot have."""
         if pin not in INPUTS:
             raise PinError(f"pin {pin!r}: expected one of the inputs {', '.join(INPUTS)}")
         top = FASTEST_XCLK if pin == "xclk" else 1
-        if isinstance(level, bool) or not 0 <= level <= top:
+        if type(level) is not int or not 0 <= level <= top:
             what = f"Hz from 0 to {top}" if pin == "xclk" else "0 or 1"
             raise PinError(f"pin {pin!r}: expected {what}, got {level!r}")
+
+    def drive(self, pin: str, level: int, now: Ns) -> None:
+        """Drive an input to 0 or 1, or xclk with a clock of so many Hz; PinError as above."""
+        self.check(pin, level)
         node = self._node
+        node.now = now
         match pin:
             case "sync":
                 falls, self.sync = level < self.sync, level
-                if falls and node.booted:
+                if falls:
                     node.commands.execute(ReleaseSync(), now)
             case "estop":
                 changes, self.estop = level != self.estop, level
@@ -153,6 +166,8 @@ class SacPins:
         levels = self._driven() if pin in INPUTS else self._levels(now)
         if pin in levels:
             return levels[pin]
+        if pin in OUTPUTS and not self._node.powered:
+            return 0
         match pin:
             case "clk":
                 return self._node.engine.clk(now)
@@ -174,6 +189,7 @@ class SacPins:
         """
         self._watcher = watcher
         self._seen = self._levels(now)
+        self._node.now = now
         self._node.watch_ops()
 
     @property
@@ -192,6 +208,8 @@ class SacPins:
         for pin, level in levels.items():
             if level != before[pin]:
                 self._watcher(pin, level, now)
+                if self._seen is not levels:
+                    return  # the watcher has done something, and what came of that is told
 
     def _driven(self) -> Mapping[str, int]:
         encoder = self._encoder
@@ -201,6 +219,8 @@ class SacPins:
     def _levels(self, now: Ns) -> dict[str, int]:
         """Of the outputs in ``told``; a command runs from its first pulse to its end."""
         node = self._node
+        if not node.powered:
+            return dict.fromkeys(TOLD, 0)
         memory, engine, microsteps = node.obeyed, node.engine, node.microstep_pins
         runs = int(engine.profile is not None and engine.begun(now))
         tells = bool(memory.ops)

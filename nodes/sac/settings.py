@@ -3,7 +3,7 @@
 Owns the settings model: how its receiver and its times behave, its oscillator and its motor, how it
 starts, and values of persistent parameters, whose limits stand in ``sacbus.language.Parameter``.
 Those of the last that are given win over an EEPROM that is already there, as if they had been
-configured; only the address does not (``SacNode.restore``).
+configured; only the address does not.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ from sacbus.language import Parameter
 from sacbus.motion import Drive, PullOut, Timebase
 from sacbus.node import NodeSettings, SettingError
 
-__all__ = ["SacSettings"]
+__all__ = ["FASTEST_XCLK", "SacSettings"]
+
+#: Hz of a clock at xclk, at most; the device's own oscillator is that fast (manual, "clock").
+FASTEST_XCLK: Final = 20_000_000
 
 #: The settings that are persistent parameters: all of these but the address, by their names but
 #: one, whose values are words for a flag.
@@ -121,7 +124,7 @@ class SacSettings(NodeSettings):
         default=0,
         metadata={
             "low": 0,
-            "high": 20_000_000,
+            "high": FASTEST_XCLK,
             "help": "the clock at xclk, Hz; 0: none, and nothing moves by it",
         },
     )

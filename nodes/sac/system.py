@@ -14,6 +14,7 @@ from typing import Protocol, assert_never
 from nodes.sac.command import CommandProcessor
 from nodes.sac.memory import Memory
 from nodes.sac.network import NetworkPort
+from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import Ns
 from sacbus.language import (
     QUEUE_LENGTH,
@@ -57,6 +58,11 @@ class Board(Protocol):
     @property
     def network(self) -> NetworkPort:
         """Its network port."""
+        ...
+
+    @property
+    def terminal_port(self) -> TerminalPort | None:
+        """Its terminal; None as long as nobody has asked for it."""
         ...
 
     @property

@@ -22,6 +22,7 @@ from typing import Final, Protocol
 from nodes.sac.queries import Query
 from sacbus.kernel import Ns
 from sacbus.language import Mode
+from sacbus.node import ReportKind
 
 __all__ = ["MAX_TYPED", "PROMPT", "TerminalOwner", "TerminalPort"]
 
@@ -39,6 +40,10 @@ _SIGNS: Final = b"+-"
 
 class TerminalOwner(Protocol):
     """The node behind the port."""
+
+    def tell(self, kind: ReportKind, text: str, line: str = "", column: int = 0) -> None:
+        """Something worth a report."""
+        ...
 
     def show(self, text: bytes) -> None:
         """Take what the port prints to wherever its far end is."""
@@ -83,11 +88,17 @@ class TerminalPort:
 
     def take(self, keys: bytes, now: Ns) -> None:
         """Take keys as a booted node does."""
-        self._out = out = bytearray()
+        self._out = bytearray()
         for key in keys:
             self._take(key, now)
+        self.flush()
         self._out = None
-        self._put(out)
+
+    def flush(self) -> None:
+        """Show what is to be shown so far, though keys are being taken yet."""
+        if self._out:
+            out, self._out = self._out, bytearray()
+            self._owner.show(bytes(out))
 
     def _take(self, key: int, now: Ns) -> None:
         if key == _LF and self._after_cr:
@@ -116,6 +127,12 @@ class TerminalPort:
         if self._too_long:
             self._too_long = False
             self._put(b"2big." + _END)
+            self._owner.tell(
+                ReportKind.REFUSED,
+                f"a typed line of more than {MAX_TYPED} characters is dropped",
+                line.decode("latin-1"),
+                MAX_TYPED + 1,
+            )
         else:
             self._execute(line, now)
         self._put(PROMPT)

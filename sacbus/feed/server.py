@@ -163,7 +163,7 @@ class FeedServer:
             client.end()
             return
         self._flush()
-        self._hosted.host.arrive(_nothing)
+        self._hosted.host.catch_up()
         client.take([encode(self._hello(), self._hosted.bus.name)])
         self._clients.append(client)
         if len(self._clients) == 1:
@@ -229,7 +229,7 @@ class FeedServer:
     def _tick(self) -> None:
         self._beat = asyncio.get_running_loop().call_later(BEAT, self._tick)
         self._quiet += 1
-        self._hosted.host.arrive(_nothing)
+        self._hosted.host.catch_up()
         if self._told or self._quiet >= QUIET_BEATS:
             self._say(Reached(self._hosted.bus.kernel.now, time.time_ns()))
             self._told = False
@@ -313,7 +313,3 @@ def _sender(sender: object, bus: Bus) -> tuple[str, int | None]:
 def _way(link: Link | Server) -> Way:
     where = link.where
     return Way(link.kind, where, None if "://" in where else os.path.realpath(where))
-
-
-def _nothing() -> None:
-    """Only to bring bus time up to date."""

@@ -6,6 +6,7 @@ bus time. A line is *heard* at the end of its trigger byte, the one after ETX: t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from nodes.sac import KIND, SacNode, SacSettings
@@ -43,7 +44,7 @@ def packet(line: str | bytes, to: int = NODE, src: int = MOTHER, *, crc: bool = 
 class Bench:
     """A bus of SACs, by default one at NODE, with everything switched on as on the device.
 
-    ``settings`` are those of all nodes that it starts with.
+    ``settings`` are those of all nodes that it starts with, ``memory`` is what they have stored.
     """
 
     def __init__(
@@ -54,20 +55,23 @@ class Bench:
         settings: SacSettings | None = None,
         kernel: Kernel | None = None,
         rate: LineRate | None = None,
+        memory: Mapping[str, object] | None = None,
     ) -> None:
         self.kernel = kernel or Kernel()
         self.bus = Bus(self.kernel, KIND.protocol, rate=rate, lanes=lanes, seed=seed)
         self.nodes: dict[int, SacNode] = {}
         for address in addresses or (NODE,):
-            self.add(address, settings or SacSettings())
+            self.add(address, settings or SacSettings(), memory)
         #: Whether bytes may come from outside, which have ended before anybody hears them.
         self.outside = False
         #: What mother's side of the line hears, in order.
         self.heard: list[Said] = []
         self.port = Port(self.bus.medium, self._take, latency=0)
 
-    def add(self, address: int, settings: SacSettings) -> SacNode:
-        node = KIND.create(address, settings, self.bus.rate, self.bus.tell)
+    def add(
+        self, address: int, settings: SacSettings, memory: Mapping[str, object] | None = None
+    ) -> SacNode:
+        node = KIND.create(address, settings, self.bus.rate, self.bus.tell, memory)
         self.bus.add(node)
         self.nodes[address] = node
         return node

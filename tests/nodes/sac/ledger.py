@@ -77,7 +77,8 @@ class WatchedNode(SacNode):
 
     def line_typed(self, line: bytes, now: Ns) -> None:
         ledger = self.ledger
-        terminal = self._terminal_port()
+        terminal = self.terminal_port
+        assert terminal is not None
         before = ledger.before_line(parse_in(terminal.mode, line).command, now)
         super().line_typed(line, now)
         ledger.after_line(before, now)

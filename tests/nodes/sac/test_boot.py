@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pytest
 
 from nodes.sac import SacSettings
 from nodes.sac.boot import LISTENS
 from sacbus.kernel import MS, SECOND, Ns
+from sacbus.node import ReportKind
 from sacbus.language import Parameter
 from sacbus.wire import ack
 from tests.nodes.sac.bench import NODE, Bench
@@ -18,8 +21,10 @@ COLD = SacSettings(boot="cold")
 class Panel:
     """A bench with somebody at the terminal and at the switches of its node."""
 
-    def __init__(self, settings: SacSettings | None = None) -> None:
-        self.bench = Bench(settings=settings)
+    def __init__(
+        self, settings: SacSettings | None = None, memory: Mapping[str, object] | None = None
+    ) -> None:
+        self.bench = Bench(settings=settings, memory=memory)
         self.node = self.bench.node
         self.shown = bytearray()
         self.node.terminal.show = self.shown.extend
@@ -289,16 +294,12 @@ def test_autorun_ends_like_any_loop_and_comes_again() -> None:
 def test_a_node_that_starts_booted_runs_from_the_start_what_it_has_stored() -> None:
     first = Panel()
     first.hears(*SAVED, "$CA3")
-    panel = Panel()
-    panel.node.restore(first.node.persist())
-    panel.bench.bus.touch(panel.node)
+    panel = Panel(memory=first.node.persist())
     assert visits(panel, 4) == [10, 20, 30, 10]
 
 
 def test_a_restored_node_that_starts_cold_waits_first() -> None:
-    panel = Panel(COLD)
-    panel.node.restore({"autorun": 1})
-    panel.bench.bus.touch(panel.node)
+    panel = Panel(COLD, {"autorun": 1})
     panel.waits(LISTENS - 1)
     assert panel.state() == "BOOT"
     panel.waits(1 * MS)
@@ -324,3 +325,17 @@ def test_a_setting_counts_as_the_factory_s() -> None:
     panel.types("x")
     panel.waits(LISTENS)
     assert (panel.node.eeprom.autorun, panel.node.eeprom.cycle) == (2, 5000)
+
+
+def test_a_factory_restore_is_told() -> None:
+    panel = Panel()
+    panel.cycles_power()
+    panel.types("x")
+    panel.waits(LISTENS)
+    (report,) = panel.bench.told(ReportKind.WARNING)
+    assert report.text.startswith("factory restore")
+
+
+def test_a_node_that_has_stored_something_warns_once() -> None:
+    bench = Bench(settings=SacSettings(ustep=7), memory={"slow": 12})
+    assert len(bench.told(ReportKind.WARNING)) == 1

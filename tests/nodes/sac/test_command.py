@@ -860,7 +860,7 @@ def test_a_held_command_whose_place_was_taken_is_told_lost_and_the_queue_stays_a
     snapshot = bench.snapshot(AT * 41)
     assert len(snapshot.pending) == 30
     overrun = [one.text for one in bench.told() if one.kind is ReportKind.OVERRUN]
-    assert overrun == ["m1000v10a1d1 was held, and is overwritten"]
+    assert overrun == ["m1000v10a1d1 had not begun, and is overwritten"]
     bench.hears("m31", at=AT * 42)
     assert len(bench.snapshot(AT * 43).pending) == 30
 

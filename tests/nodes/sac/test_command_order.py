@@ -517,3 +517,51 @@ def test_all_of_it_is_acknowledged_and_nothing_else_is_said() -> None:
     line.run()
     assert {len(said.data) for said in line.bench.heard} == {4}
     assert {said.data[2] for said in line.bench.heard} == {NODE}
+
+
+# ---- what has not begun -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("then", [["xm10v100a999d999"], ["mv100a999d999", "N"]])
+def test_what_waits_for_its_start_comes_after_what_goes_before_it(then: list[str]) -> None:
+    line = Line()
+    line.says("m400v100a999d999t3000000", *then)
+    assert line.run()[1:] == [400]
+    assert line.bench.told(ReportKind.OVERRUN) == []
+
+
+def test_what_waits_for_its_start_in_a_loop_counts_no_iteration() -> None:
+    line = filled()
+    line.says("q1t3000000", "ln1", "la", "x9")
+    assert line.run()[:4] == [9, 1, 2, 3]
+
+
+def test_a_held_first_command_of_a_loop_counts_no_iteration() -> None:
+    line = filled()
+    line.says("q2s", "ln1", "ls2", "lf3", "x9")
+    line.run()
+    line.says("y")
+    assert line.run() == [9, 2, 3]
+
+
+def test_s_before_the_first_pulse_leaves_nothing_that_others_wait_for() -> None:
+    line = Line()
+    line.says("m400v100t3000000", "s", "mv100a999d999")
+    line.until(line.at + 100 * MS)
+    assert line.bench.snapshot(line.at).rpm == 100
+
+
+def test_a_loop_warns_of_its_commands_once() -> None:
+    line = Line()
+    line.says("q1m20v300", "q2m-20v300", "ls1", "lf2")
+    line.until(line.at + 20 * SECOND)
+    warned = [report.line for report in line.bench.told(ReportKind.WARNING)]
+    assert sorted(warned) == ["m-20v300a1d1", "m20v300a1d1"]
+    # An edit is another command, and another loop another chance.
+    line.says("q1m19")
+    line.until(line.at + 20 * SECOND)
+    line.says("S", "ls1", "lf2")
+    line.until(line.at + 20 * SECOND)
+    warned = [report.line for report in line.bench.told(ReportKind.WARNING)]
+    assert warned.count("m19v300a1d1") == 2
+    assert warned.count("m-20v300a1d1") == 2

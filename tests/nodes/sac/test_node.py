@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 
 import pytest
@@ -18,9 +19,13 @@ from tests.nodes.sac.bench import EVEN, LOAD_ACC, NODE, Bench, packet
 AT: Ns = 20 * MS
 
 
-def node(settings: SacSettings | None = None, told: list[Report] | None = None) -> SacNode:
+def node(
+    settings: SacSettings | None = None,
+    told: list[Report] | None = None,
+    memory: Mapping[str, object] | None = None,
+) -> SacNode:
     reports = [] if told is None else told
-    return KIND.create(10, settings or SacSettings(), LineRate(), reports.append)
+    return KIND.create(10, settings or SacSettings(), LineRate(), reports.append, memory)
 
 
 # ---- the contract -------------------------------------------------------------------------------
@@ -91,16 +96,14 @@ def test_looking_changes_nothing() -> None:
 def test_what_is_persisted_makes_the_same_node_again() -> None:
     first = node(SacSettings(ustep=3, soft_ops=True, ack=False))
     told: list[Report] = []
-    second = node(told=told)
-    second.restore(first.persist())
+    second = node(told=told, memory=first.persist())
     assert second.persist() == first.persist()
     assert told == []
 
 
 def test_a_stored_address_wins_over_the_configured_one_and_is_warned_of() -> None:
     told: list[Report] = []
-    made = node(told=told)
-    made.restore({"d_id": 33})
+    made = node(told=told, memory={"d_id": 33})
     assert made.address == 33
     (report,) = told
     assert report.kind is ReportKind.WARNING
@@ -110,23 +113,20 @@ def test_a_stored_address_wins_over_the_configured_one_and_is_warned_of() -> Non
 
 def test_odd_values_are_reported_and_the_node_starts_all_the_same() -> None:
     told: list[Report] = []
-    made = node(told=told)
-    made.restore({"ustep": 99, "colour": 1, "sprf": 0})
+    made = node(told=told, memory={"ustep": 99, "colour": 1, "sprf": 0})
     assert [report.kind for report in told] == [ReportKind.WARNING] * 3
     assert made.address == 10
     assert made.persist()["sprf"] == 200
 
 
 def test_what_is_restored_is_obeyed() -> None:
-    bench = Bench()
-    bench.node.restore({**bench.node.persist(), "ustep": 2, "cw": 0, "dir": 1, "cycle": 30_000})
+    bench = Bench(memory={"ustep": 2, "cw": 0, "dir": 1, "cycle": 30_000})
     bench.hears("m5", at=AT)
     bench.run()
     assert bench.kernel.now == AT + LOAD_ACC + 5 * 30 * MS
     assert bench.position(bench.kernel.now) == -20
-    bench.node.restore({**bench.node.persist(), "ack": 0})
-    bench.heard.clear()
-    bench.hears("m5", at=bench.kernel.now + SECOND)
+    bench = Bench(memory={**bench.node.persist(), "ack": 0})
+    bench.hears("m5", at=AT)
     bench.run()
     assert bench.heard == []
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from nodes.sac import SacSettings
@@ -67,11 +69,18 @@ def test_every_pin_has_a_level_and_open_inputs_are_pulled_up() -> None:
         ("SYNC", 1, "one of the inputs"),
         ("sync", 2, "expected 0 or 1, got 2"),
         ("sync", True, "expected 0 or 1, got True"),
+        ("sync", 0.5, "expected 0 or 1, got 0.5"),
+        ("sync", "1", "expected 0 or 1, got '1'"),
+        ("estop", None, "expected 0 or 1, got None"),
         ("xclk", -1, "expected Hz from 0 to 20000000, got -1"),
         ("xclk", 20_000_001, "expected Hz from 0"),
     ],
 )
-def test_what_cannot_be_driven_is_refused_in_one_line(pin: str, value: int, said: str) -> None:
+def test_what_cannot_be_driven_is_refused_in_one_line(
+    pin: str,
+    value: Any,
+    said: str,  # noqa: ANN401 (what is no level)
+) -> None:
     pins = Bench().node.pins
     with pytest.raises(PinError, match=said):
         pins.drive(pin, value, 0)
@@ -336,3 +345,72 @@ def test_microstep_pins_follow_the_driver_and_are_told_at_the_reboot() -> None:
     bench.hears("$R", at=SECOND)
     bench.run()
     assert edges == [("ms1", 1, SECOND), ("ms2", 1, SECOND), ("ms3", 1, SECOND)]
+
+
+def test_who_begins_to_watch_in_a_start_wait_is_told_of_the_start() -> None:
+    bench = Bench()
+    bench.hears("m2v10t2000000", at=AT)
+    bench.kernel.run_until(SECOND)
+    edges = watched(bench)
+    bench.run()
+    start = AT + LOAD_ACC + 2 * SECOND
+    assert edges[:2] == [("op_sa", 1, start), ("op_sb", 0, start)]
+    assert [edge[0] for edge in edges].count("op_sa") == 2
+
+
+def test_who_begins_to_watch_in_motion_is_told_of_the_end() -> None:
+    bench = Bench()
+    bench.hears("m2v10", at=AT)
+    bench.kernel.run_until(AT + LOAD_ACC + STEP)
+    edges = watched(bench)
+    bench.run()
+    assert [edge[:2] for edge in edges] == [("op_sa", 0), ("op_sb", 1)]
+
+
+# ---- power --------------------------------------------------------------------------------------
+
+
+def switch(bench: Bench, at: Ns, *, on: bool) -> None:
+    bench.kernel.run_until(at)
+    bench.node.power(on=on, now=at)
+    bench.bus.touch(bench.node)
+
+
+def test_without_power_every_output_is_low() -> None:
+    bench = Bench()
+    bench.hears("m-5v10", at=AT)
+    switch(bench, AT + LOAD_ACC + 1, on=False)
+    later = bench.kernel.now + 500
+    assert [level(bench, pin, later) for pin in OUTPUTS] == [0] * len(OUTPUTS)
+    switch(bench, SECOND, on=True)
+    assert level(bench, "op_sb", SECOND + 1) == 1
+
+
+def test_estop_that_is_low_when_power_comes_keeps_everything_from_starting() -> None:
+    bench = Bench()
+    drive(bench, "estop", 0, AT)
+    switch(bench, SECOND, on=False)
+    switch(bench, 2 * SECOND, on=True)
+    bench.hears("m5v10", at=4 * SECOND)
+    assert bench.position(10 * SECOND) == 0
+    drive(bench, "estop", 1, 11 * SECOND)
+    assert bench.position(20 * SECOND) == 5
+
+
+def test_the_encoder_moves_no_motor_without_power() -> None:
+    bench = Bench()
+    switch(bench, AT, on=False)
+    turn(bench, 3, SECOND)
+    switch(bench, 2 * SECOND, on=True)
+    turn(bench, 3, 2 * SECOND + MS)  # it is not over with its boot yet
+    assert bench.position(5 * SECOND) == 0
+    turn(bench, 3, 6 * SECOND)
+    assert bench.position(6 * SECOND) == 3
+
+
+def test_what_a_pin_sets_going_is_reported_with_its_time() -> None:
+    bench = Bench()
+    bench.hears("m5v700a999d999s", at=AT)
+    bench.bus.reports.clear()
+    drive(bench, "sync", 0, 5 * SECOND)
+    assert {report.when for report in bench.told()} == {5 * SECOND}

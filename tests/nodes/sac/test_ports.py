@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from nodes.sac import SacSettings
 from nodes.sac.ports import understand
 from sacbus.kernel import MS, SECOND, Ns
 from sacbus.node import ReportKind
@@ -141,3 +142,52 @@ def test_a_terminal_on_the_line_at_another_rate_hears_and_says_nothing() -> None
 )
 def test_rates_may_differ_by_two_and_a_half_per_cent(baud: int, other: int, both: bool) -> None:
     assert understand(baud, other) is both
+
+
+def test_a_terminal_on_the_line_that_has_something_to_say_is_not_quiet() -> None:
+    exchange = Exchange()
+    bench = exchange.bench
+    quiet = [bench.node.quiet]
+    bench.sends(b"v120\r", at=2 * SECOND)
+    bench.kernel.run_until(2 * SECOND + bench.span(5) - 1)
+    quiet.append(bench.node.quiet)
+    bench.run()
+    quiet.append(bench.node.quiet)
+    assert quiet == [True, False, True]
+
+
+def test_the_echo_of_the_reboot_stays_where_it_was_typed() -> None:
+    bench = Bench()
+    shown: list[bytes] = []
+    bench.node.terminal.show = shown.append
+    for number, keys in enumerate((b"$CE1\r", b"$R\r")):
+        bench.kernel.run_until((number + 1) * SECOND)
+        bench.node.terminal.type(keys, bench.kernel.now)
+        bench.bus.touch(bench.node)
+    bench.run()
+    assert b"".join(shown) == b"$CE1\r\nSAC>$R\r\n"
+    # The prompt after the boot stands where the terminal is then.
+    assert b"".join(said.data for said in bench.heard) == b"SAC>"
+
+
+def test_what_it_has_to_say_outlasts_a_reboot_that_leaves_the_ports_as_they_are() -> None:
+    exchange = Exchange()
+    said = exchange.line(b"vd\r$R\rv7\r", 2 * SECOND)
+    assert said == b"vd\r\n100 RPM  cycle 3000\r\nSAC>$R\r\nSAC>v7\r\nSAC>"
+
+
+def test_a_node_set_back_to_the_lines_rate_hears_again() -> None:
+    bench = Bench(settings=SacSettings(sw=9_600))
+    bench.node.terminal.show = bytearray().extend
+    bench.hears("m5v10", at=AT)
+    assert bench.position(SECOND) == 0
+    bench.node.terminal.type(b"$Cn38400\r$R\r", SECOND)
+    bench.bus.touch(bench.node)
+    bench.hears("m5v10", at=2 * SECOND)
+    bench.run()
+    assert bench.position(bench.kernel.now) == 5
+
+
+def test_a_rate_that_nobody_understands_is_told_by_the_name_of_the_node() -> None:
+    bench = Bench(settings=SacSettings(sw=9_600))
+    assert [report.address for report in bench.told()] == [NODE]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import pytest
@@ -23,8 +23,13 @@ AT: Ns = 20 * MS
 class Desk:
     """A bench and a clock: lines one after the other, 20 ms apart."""
 
-    def __init__(self, settings: SacSettings | None = None, rate: LineRate | None = None) -> None:
-        self.bench = Bench(settings=settings, rate=rate)
+    def __init__(
+        self,
+        settings: SacSettings | None = None,
+        rate: LineRate | None = None,
+        memory: Mapping[str, object] | None = None,
+    ) -> None:
+        self.bench = Bench(settings=settings, rate=rate, memory=memory)
         self.node = self.bench.node
         self.now: Ns = 0
 
@@ -413,9 +418,14 @@ def test_a_node_is_found_at_its_new_address_after_the_reboot_and_not_before(desk
     assert desk.bench.bus.node(99) is desk.node
 
 
-def test_a_node_that_was_given_another_memory_is_found_once_it_is_touched(desk: Desk) -> None:
-    desk.node.restore({"d_id": 99})
+def test_a_node_is_found_at_its_new_address_once_it_is_touched_after_power_came(desk: Desk) -> None:
+    desk.hears("$CM99")
+    desk.rests()
+    for on in (False, True):
+        desk.node.power(on=on, now=desk.now)
     desk.bench.bus.touch(desk.node)
+    desk.rests()
+    desk.bench.heard.clear()
     desk.hears("v100", to=99)
     desk.rests()
     assert desk.bench.answers == [ack(1, 99)]
@@ -475,7 +485,7 @@ def test_a_node_is_born_with_the_rate_of_its_line() -> None:
     assert desk.bench.told() == []
     assert "sw" not in desk.node.persist()
     stored = {name_of(Parameter.SW): 38_400}
-    desk.node.restore(stored)
+    desk = Desk(rate=LineRate(9_600), memory=stored)
     assert desk.answered("v100") == []
 
 

@@ -90,7 +90,7 @@ def test_what_is_printed_while_nobody_is_there_is_lost(console: Console) -> None
 def test_a_node_has_no_port_before_somebody_asks_for_it() -> None:
     bench = Bench()
     bench.hears(" hello", at=20 * MS)
-    assert bench.node._terminal is None
+    assert bench.node.terminal_port is None
     terminal: Terminal = bench.node.terminal
     assert bench.node.terminal is terminal
 

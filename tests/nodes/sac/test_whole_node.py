@@ -10,6 +10,7 @@ soft ops and what the node was told to send on; and all of it is the same when n
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import hypothesis.strategies as st
@@ -99,8 +100,10 @@ class WatchedBench(Bench):
 
     ledger: Ledger
 
-    def add(self, address: int, settings: SacSettings) -> WatchedNode:
-        node = WatchedNode(address, settings, self.bus.rate, self.bus.tell)
+    def add(
+        self, address: int, settings: SacSettings, memory: Mapping[str, object] | None = None
+    ) -> WatchedNode:
+        node = WatchedNode(address, settings, self.bus.rate, self.bus.tell, memory)
         self.ledger = Ledger(node, self.bus.rate.baud)
         self.bus.add(node)
         self.nodes[address] = node
