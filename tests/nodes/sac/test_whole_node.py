@@ -57,7 +57,7 @@ bodies = lines.map(lambda line: line.encode("latin-1", "replace"))
 spans = st.sampled_from([1, 40 * US, MS, 30 * MS, SECOND]) | st.integers(1, 20 * SECOND)
 
 #: Instants with events that a wait goes through at most: quick motion may be endless.
-EVENTS = 40
+EVENTS = 30
 
 
 @dataclass(frozen=True)
@@ -298,4 +298,4 @@ class WholeNode(RuleBasedStateMachine):
 
 
 TestWholeNode = pytest.mark.slow(WholeNode.TestCase)
-TestWholeNode.settings = settings(max_examples=60, stateful_step_count=40)
+TestWholeNode.settings = settings(max_examples=40, stateful_step_count=40)
