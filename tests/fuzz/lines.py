@@ -38,7 +38,7 @@ _NUMBERS: Final = (*(str(number) for number in range(100)), *_EDGES, *_DECIMALS)
 _QUALIFIERS: Final = (
     *("v300", "v60", "v1200", "vc900", "a", "d", "a5", "d5", "a.5", "d999", "a999", "l1", "l0"),
     *(letter + number for letter in ("v", "V", "vc", "t", "u") for number in _NUMBERS[::3]),
-    *(letter + number for letter in "aAdD" for number in (*_DECIMALS, *_NUMBERS[::9])),
+    *(letter + number for letter in "ADad" for number in (*_DECIMALS, *_NUMBERS[::9])),
     *("s", "S0", "s1", "f", "p", "P", "u7", "t500"),
 )
 #: What does not belong there, but might.
