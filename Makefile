@@ -18,7 +18,7 @@ ARGS ?=
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check --use-pep517
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test coverage check format bench clean
+.PHONY: help serve test coverage check format bench fuzz clean
 
 help:
 	@echo "make serve     host a bus behind $(PTY), or those of CONFIG= (ARGS= adds options)"
@@ -27,6 +27,7 @@ help:
 	@echo "make coverage  run the tests and show which branches they miss"
 	@echo "make format    let ruff write what check would ask for"
 	@echo "make bench     run the benchmarks"
+	@echo "make fuzz      ten million random lines through both ports of nodes (ARGS=\"--seed 5\")"
 	@echo "make clean     remove what the above have made"
 
 # exec: the shell steps aside, so that Ctrl-C and the exit status are sacbus's own.
@@ -55,6 +56,10 @@ format: $(VENV)/dev
 
 bench: $(VENV)/dev
 	@exec $(BIN)/python -m benchmarks $(ARGS)
+
+# exec: Ctrl-C and the exit status are its own.
+fuzz: $(VENV)/dev
+	@exec $(BIN)/python -m tests.fuzz $(ARGS)
 
 clean:
 	@rm -rf $(VENV) build dist htmlcov .coverage .coverage.* .hypothesis .import_linter_cache \

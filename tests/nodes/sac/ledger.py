@@ -120,6 +120,7 @@ class Before:
     boot: object
     idle: bool
     barred: bool
+    ustep: int
     rows: tuple[Motion, ...]
     next_free: int
     pending: tuple[int, ...]
@@ -298,6 +299,7 @@ class Ledger:
             self._boot,
             idle,
             self.estop_is_low,
+            self.node.obeyed.ustep,
             queue.rows(),
             queue.next_free,
             self.pending,
@@ -308,6 +310,8 @@ class Ledger:
         command = before.command
         moved = self._expect_session(command)
         commands = self.node.commands
+        if isinstance(command, Reboot):
+            self._count_in_other_microsteps(before.ustep, now)
         starts_now = isinstance(command, ReleaseSync) and self.node.engine.started == now
         if not starts_now:
             assert self._where(now) == self.position, "a line has moved the motor at once"
@@ -318,6 +322,14 @@ class Ledger:
             self.stands()
         elif isinstance(command, Move) and moved is not None and before.idle and not before.barred:
             assert moved in (commands.current, commands.held)
+
+    def _count_in_other_microsteps(self, ustep: int, now: Ns) -> None:
+        """The motor stands where it stood, or on the nearest of its new microsteps."""
+        place, pulses = self._where(now)
+        moved = abs((place << ustep) - (self.position[0] << self.node.obeyed.ustep))
+        assert 2 * moved <= 1 << ustep
+        assert pulses == self.position[1]
+        self.position = (place, pulses)
 
     def _expect_session(self, command: Command | None) -> Motion | None:
         """What the line leaves of the session; the motion that it puts into the queue."""
@@ -388,10 +400,11 @@ class Ledger:
 
     def may_refuse(self, packets: int) -> None:
         """So many packets are on their way to it that may arrive with a wrong CRC."""
-        self.naks_owed = packets
+        self.naks_owed += packets
 
     def says(self, at: Ns, data: bytes) -> None:
         """The node begins to say something on the line, at ``at``."""
+        self._see_whether_astray(at)
         if at <= self.astray_until:
             return
         if len(data) == 4 and data[0] == STX and data[3] == NAK and self.naks_owed:

@@ -297,6 +297,22 @@ def test_the_31st_pending_command_overwrites_the_oldest_and_is_reported() -> Non
     assert bench.answers == [ack(MOTHER, NODE)] * 33
 
 
+def test_what_comes_behind_the_31st_overwrites_the_oldest_too_and_runs_once() -> None:
+    bench = Bench()
+    bench.hears("m1v10s", at=AT)
+    for number in range(2, 33):
+        bench.hears(f"m{number}v100a999d999", at=AT + number * 20 * MS)
+    bench.hears("y", at=SECOND)
+    # The 32 steps in the place of 2 are on their way, and 3 is the oldest of 29 that wait.
+    bench.hears("m40v100a999d999", at=SECOND + 80 * MS)
+    texts = [report.text for report in bench.told(ReportKind.OVERRUN)]
+    assert texts == [
+        "queue position 2 overwritten, which was pending",
+        "queue position 3 overwritten, which was pending",
+    ]
+    assert settled(bench) == sum(range(1, 33)) - 2 - 3 + 40
+
+
 def test_queue_positions_go_round() -> None:
     bench = Bench()
     for number in range(65):
