@@ -14,10 +14,9 @@ from datetime import UTC, datetime, timedelta
 import click
 
 from sacbus.kernel import US, Ns
-from sacbus.monitor.entries import Entry, concerns, is_fault
 from sacbus.monitor.page import JsonPage, TextPage, printable
-from sacbus.monitor.summary import Summary
 from sacbus.monitor.wanted import Wanted
+from sacbus.watch import Entry, Summary, concerns, is_fault
 from sacbus.writer import Writer
 
 __all__ = ["Output", "WallClock"]

@@ -14,10 +14,9 @@ from sacbus.feed import Feed, Hello, Missed, Reached, Sent, Stopped
 from sacbus.kernel import SECOND, LineRate, Ns
 from sacbus.links import open_line
 from sacbus.monitor.output import Output
-from sacbus.monitor.summary import Summary
 from sacbus.monitor.wanted import Wanted
-from sacbus.monitor.watch import FEED_SLACK, LINK_SLACK, Watch
 from sacbus.node import KindError, Protocol, Report, find_kind, kinds
+from sacbus.watch import FEED_SLACK, LINK_SLACK, Summary, Watch
 
 __all__ = ["watch_feed", "watch_link"]
 
