@@ -1,0 +1,1 @@
+"""Recordings and captures of what happened on a bus."""
