@@ -1,14 +1,14 @@
 """What was said on a line, as a capture: a pcapng block for every entry that has bytes.
 
 Owns what of an entry goes where: its bytes, as they came, are the packet; the time is that of its
-first bit; what bytes alone do not tell stands in comments, each ``KEY: VALUE``. ``sac.lua``, the
-dissector, reads the comments and does without them (``docs/wireshark.md``). Writes nothing
-anywhere.
+first bit; what bytes alone do not tell stands in its comment, a line ``KEY: VALUE`` each.
+``sac.lua``, the dissector, reads comments and does without them (``docs/wireshark.md``). Writes
+nothing anywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from pathlib import Path
 from typing import Final, assert_never
 
 from sacbus import __version__
@@ -16,7 +16,10 @@ from sacbus.kernel import LineRate, Ns
 from sacbus.trace.pcapng import LINKTYPE_USER0, LINKTYPE_USER1, interface, packet, section
 from sacbus.watch import Collision, Entry, Lost, Reported, Spoken, Unanswered
 
-__all__ = ["Capture", "CapturedLine"]
+__all__ = ["DISSECTOR", "Capture", "CapturedLine"]
+
+#: By which Wireshark reads what is written here.
+DISSECTOR: Final = Path(__file__).with_name("sac.lua")
 
 #: The dissector takes USER0 for SAC; bytes of other protocols must not get to it.
 _LINK_TYPES: Final = {"sac": LINKTYPE_USER0}
@@ -63,12 +66,8 @@ class CapturedLine:
         self.header = header
         self._first = first
         self._epoch = epoch
-        #: What has been missed since the last block.
-        self._dropped = 0
-
-    def missed(self, count: int) -> None:
-        """So many lines or packets are missing before the next block."""
-        self._dropped += count
+        #: Lines or packets that are missing before the next block; it will say so.
+        self.dropped = 0
 
     def blocks(self, entry: Entry) -> bytes:
         """The block of a packet, an answer or garbage, one for each part of a collision.
@@ -78,36 +77,47 @@ class CapturedLine:
         """
         match entry:
             case Spoken():
-                return self._block(entry.lane, entry.start, entry.raw, list(_comments(entry)))
+                return self._block(entry.lane, entry.start, entry.raw, _remarks(entry))
             case Collision(lane=lane, parts=parts):
                 blocks = b""
                 for part in parts:
                     others = ", ".join(one.sender for one in parts if one is not part)
-                    comments = [f"sender: {part.sender}", f"collision with: {others}"]
-                    blocks += self._block(lane, part.start, part.raw, comments)
+                    remarks = {"sender": part.sender, "collision with": others}
+                    blocks += self._block(lane, part.start, part.raw, remarks)
                 return blocks
             case Lost(lines):
-                self.missed(lines)
+                self.dropped += lines
                 return b""
             case Unanswered() | Reported():
                 return b""
             case _:
                 assert_never(entry)
 
-    def _block(self, lane: int, start: Ns, raw: bytes, comments: list[str]) -> bytes:
-        dropped, self._dropped = self._dropped, 0
+    def _block(self, lane: int, start: Ns, raw: bytes, remarks: dict[str, str]) -> bytes:
+        dropped, self.dropped = self.dropped, 0
         # Counted back from its arrival, a first byte may have begun before anybody listened.
         time = max(self._epoch + start, 0)
-        return packet(self._first + lane, time, raw, comments, dropped=dropped)
+        # One comment: each counts as a remark of its own in Wireshark's "Expert Information".
+        comment = "\n".join(f"{key}: {_in_one_line(text)}" for key, text in remarks.items())
+        return packet(self._first + lane, time, raw, (comment,), dropped=dropped)
 
 
-def _comments(entry: Spoken) -> Iterator[str]:
+def _remarks(entry: Spoken) -> dict[str, str]:
     """What is known of it beyond its bytes."""
     said = entry.said
-    if said.kind in ("packet", "garbage"):
-        yield f"words: {said.words}"
+    remarks = {}
+    if said.kind == "packet":
+        remarks["words"] = said.words
+    elif said.kind == "garbage":
+        remarks["garbage"] = said.words
     if entry.sender is not None:
-        yield f"sender: {entry.sender}"
-    yield f"on the line: {entry.end - entry.start} ns"
+        remarks["sender"] = entry.sender
+    remarks["on the line"] = f"{entry.end - entry.start} ns"
     if entry.request is not None and entry.delay is None:
-        yield "delay: not known"
+        remarks["delay"] = "not known"
+    return remarks
+
+
+def _in_one_line(text: str) -> str:
+    """A path may hold a line end, which would begin another remark."""
+    return text if text.isprintable() else text.encode("unicode_escape").decode()

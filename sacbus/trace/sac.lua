@@ -3,14 +3,15 @@
 -- Reads the bytes of the RS485 line as link type USER0 (147), one or more packets a frame, and of
 -- TCP connections to a bus by "Decode As". Frames, CRC and answers are decoded here, from bytes
 -- alone. What bytes do not tell (a command in words, who sent it, how long it took) is taken from
--- the comments that sacbus writes to its captures, "KEY: VALUE" each.
+-- the comments that sacbus writes to its captures, "KEY: VALUE" in each line.
 --
--- Installing and using it: docs/wireshark.md of sacbus. Wireshark 3.6 or newer.
+-- Installing and using it: docs/wireshark.md of sacbus. Runs on Lua 5.1 to 5.4: no bit library is
+-- in all of them, so the CRC does without.
 
 local sac = Proto("sac", "SAC network")
 
 local STX, ETX, ACK, NAK, DC1, DC2 = 0x02, 0x03, 0x06, 0x15, 0x11, 0x12
-local EVERYBODY = 0
+local EVERYBODY, MOTHER = 0, 1
 -- A frame that has not ended after so many bytes is given up, as sacbus's receiver does.
 local MAX_FRAME = 255
 -- An answer that comes later answers nothing, s. The monitor forgets a packet about as late.
@@ -22,8 +23,8 @@ sac.prefs.baud = Pref.uint(
 
 local f = {
     type = ProtoField.string("sac.type", "Type", base.ASCII, "packet, ack, nak, garbage, collision"),
-    dst = ProtoField.uint8("sac.dst", "Destination", base.DEC, { [0] = "all", [1] = "mother" }),
-    src = ProtoField.uint8("sac.src", "Source", base.DEC, { [0] = "all", [1] = "mother" }),
+    dst = ProtoField.uint8("sac.dst", "Destination", base.DEC),
+    src = ProtoField.uint8("sac.src", "Source", base.DEC),
     addr = ProtoField.uint8("sac.addr", "Source or destination", base.DEC),
     broadcast = ProtoField.bool("sac.broadcast", "General call"),
     body = ProtoField.string("sac.body", "Body"),
@@ -72,24 +73,41 @@ sac.experts = { e.wrong_crc, e.no_nul, e.garbage, e.collision, e.nak, e.no_answe
 local frame_time = Field.new("frame.time_epoch")
 local frame_comment = Field.new("frame.comment")
 local frame_drops = Field.new("frame.drop_count")
+local frame_interface = Field.new("frame.interface_name")
+
+-- The exclusive or of two bytes.
+local function xor(a, b)
+    local result, weight = 0, 1
+    for _ = 1, 8 do
+        if a % 2 ~= b % 2 then result = result + weight end
+        a, b, weight = math.floor(a / 2), math.floor(b / 2), weight * 2
+    end
+    return result
+end
 
 -- CRC-8 Dallas/Maxim of a string: polynomial 0x31, reflected 0x8C, from 0.
+local crc_of_byte = {}
+for byte = 0, 255 do
+    local crc = byte
+    for _ = 1, 8 do
+        local low = crc % 2
+        crc = math.floor(crc / 2)
+        if low == 1 then crc = xor(crc, 0x8C) end
+    end
+    crc_of_byte[byte] = crc
+end
+
 local function crc8(text)
     local crc = 0
     for place = 1, #text do
-        crc = bit32.bxor(crc, text:byte(place))
-        for _ = 1, 8 do
-            local low = bit32.band(crc, 1)
-            crc = bit32.rshift(crc, 1)
-            if low == 1 then crc = bit32.bxor(crc, 0x8C) end
-        end
+        crc = crc_of_byte[xor(crc, text:byte(place))]
     end
     return crc
 end
 
 -- What stands at a place (from 1) of the bytes: a table with `kind`, and `stop`, its last byte.
 -- The rules, and their order, are those of sacbus/wire/robust.py. At the end of the bytes nothing
--- more is waited for: what is begun is garbage, with `open` set.
+-- more is waited for, but `open` is set where more might have changed it.
 local function unit_at(data, at)
     if data:byte(at) ~= STX then
         local stx = data:find("\2", at, true)
@@ -142,7 +160,9 @@ local function unit_at(data, at)
     if check == STX and not (crc == STX and behind == 0) then
         return { kind = "garbage", words = "cut short", stop = etx }
     end
-    if not behind then return given_up() end
+    if not behind and limit - at + 1 == MAX_FRAME then return given_up() end
+    -- At the end of a capture's frame the NUL is missing; in a stream it may yet come.
+    unit.open = not behind
     unit.check = check
     if behind == 0 then unit.stop = etx + 2 end
     unit.verdict = check ~= crc and "wrong" or behind == 0 and "right" or "no NUL"
@@ -153,8 +173,10 @@ end
 local function remarks_of_frame()
     local remarks = {}
     for _, comment in ipairs({ frame_comment() }) do
-        local key, value = tostring(comment.value):match("^([%a ]+): (.*)$")
-        if key then remarks[key] = value end
+        for line in tostring(comment.value):gmatch("[^\n]+") do
+            local key, value = line:match("^([%a ]+): (.*)$")
+            if key then remarks[key] = value end
+        end
     end
     return remarks
 end
@@ -169,6 +191,12 @@ local function later(time, seconds)
     return time + NSTime.new(math.floor(nanos / 1e9), nanos % 1e9)
 end
 
+-- The name of the line that this frame is of: the lanes of one are interfaces of their own.
+local function line_of_frame()
+    local interface = frame_interface()
+    return interface and tostring(interface.value):gsub(" lane %d+$", "") or ""
+end
+
 -- What is known of the units of all frames so far, by frame and number in it: what each answers,
 -- what answers it. Filled on the first pass, in the order of the file.
 local known, asked, to_send_on
@@ -177,8 +205,13 @@ function sac.init()
     known, asked, to_send_on = {}, {}, {}
 end
 
+-- Who asked whom, on which line.
+local function pair_of(from, to)
+    return from .. ">" .. to .. " " .. line_of_frame()
+end
+
 local function link_answer(unit, fact)
-    local pair = unit.src .. ">" .. unit.dst
+    local pair = pair_of(unit.dst, unit.src)
     local request = asked[pair]
     asked[pair] = nil
     if not request then return end
@@ -194,23 +227,27 @@ local function link_answer(unit, fact)
 end
 
 local function link_packet(unit, fact)
-    if unit.dst ~= EVERYBODY then asked[unit.dst .. ">" .. unit.src] = fact end
+    if unit.dst ~= EVERYBODY then asked[pair_of(unit.src, unit.dst)] = fact end
     -- Is it the line that somebody else's packet asked its sender to send on?
-    local waiting = to_send_on[unit.src]
+    local key = unit.src .. " " .. line_of_frame()
+    local waiting = to_send_on[key]
     if waiting and waiting.line == unit.body and (waiting.to or unit.dst) == unit.dst then
         fact.forward_of = waiting.fact.frame
         waiting.fact.forward_in = fact.frame
-        to_send_on[unit.src] = nil
+        to_send_on[key] = nil
     end
     if unit.forward then
-        to_send_on[unit.dst] = { to = unit.forward.to, line = unit.forward.line, fact = fact }
+        to_send_on[unit.dst .. " " .. line_of_frame()] = { to = unit.forward.to, line = unit.forward.line, fact = fact }
     end
 end
 
 -- The fact of a unit: made on the first pass, where answers and packets meet.
 local function fact_of(unit, pinfo, number, remarks, times)
     local key = pinfo.number .. "/" .. number
-    if pinfo.visited and known[key] then return known[key] end
+    if pinfo.visited and known[key] then
+        known[key].complete = true -- and so are those of all frames
+        return known[key]
+    end
     local fact = { frame = pinfo.number, start = times.start, stop = times.stop,
         inexact = remarks["delay"] ~= nil }
     known[key] = fact
@@ -256,8 +293,10 @@ local function name_of(address)
 end
 
 local function add_addresses(tree, range, unit)
-    tree:add(f.dst, range(1, 1))
-    tree:add(f.src, range(2, 1))
+    local to, from = tree:add(f.dst, range(1, 1)), tree:add(f.src, range(2, 1))
+    if unit.dst == EVERYBODY then to:append_text(" (all)") end
+    if unit.dst == MOTHER then to:append_text(" (mother)") end
+    if unit.src == MOTHER then from:append_text(" (mother)") end
     tree:add(f.addr, range(1, 1)):set_hidden()
     tree:add(f.addr, range(2, 1)):set_hidden()
     if unit.dst == EVERYBODY then tree:add(f.broadcast, range(1, 1), true):set_generated() end
@@ -295,7 +334,7 @@ local function add_packet(tree, range, unit, fact, remarks, pinfo)
     if fact.answer then
         tree:add(f.response_in, fact.answer):set_generated()
         if fact.time then tree:add(f.response_time, fact.time):set_generated() end
-    elseif pinfo.visited and unit.dst ~= EVERYBODY then
+    elseif fact.complete and unit.dst ~= EVERYBODY then
         tree:add_proto_expert_info(e.no_answer)
     end
     local said = words or unit.soft_op
@@ -327,8 +366,7 @@ local function add_collision(tree, range, data, others)
     return ("collision with %s: %s"):format(others, hex(data, 24))
 end
 
-local function add_garbage(tree, range, data, unit, remarks)
-    local words = remarks["words"] or unit.words
+local function add_garbage(tree, range, data, words)
     tree:add(f.garbage, range, words):set_generated()
     tree:add(f.bytes, range)
     tree:add_proto_expert_info(e.garbage)
@@ -350,7 +388,7 @@ local function show(unit, buffer, from, pinfo, parent, number, remarks, times)
     elseif unit.kind == "collision" then
         said = add_collision(tree, range, data, remarks["collision with"])
     elseif unit.kind == "garbage" then
-        said = add_garbage(tree, range, data, unit, remarks)
+        said = add_garbage(tree, range, data, unit.words)
     else
         said = add_answer(tree, range, unit, fact)
     end
@@ -375,6 +413,8 @@ function sac.dissector(buffer, pinfo, tree)
         local unit
         if remarks["collision with"] then
             unit = { kind = "collision", stop = size }
+        elseif remarks["garbage"] then
+            unit = { kind = "garbage", words = remarks["garbage"], stop = size }
         else
             unit = unit_at(data, at)
         end
