@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import click
 
+from sacbus.cli.options import verbose
+
 __all__ = ["dissector_command"]
 
 
 @click.command("dissector")
+@verbose
 def dissector_command() -> None:
     """Print the path of the dissector, by which Wireshark and tshark read captures.
 
@@ -15,7 +18,8 @@ def dissector_command() -> None:
     Folders and `tshark -G folders` tell which that is.
 
     \b
-    Example: tshark -X lua_script:"$(sacbus dissector)" -r capture.pcapng
+    Example: sacbus dissector
+             tshark -X lua_script:"$(sacbus dissector)" -r capture.pcapng
              ln -s "$(sacbus dissector)" ~/.local/lib/wireshark/plugins/
     """
     from sacbus.trace.capture import DISSECTOR

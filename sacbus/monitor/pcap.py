@@ -59,6 +59,7 @@ class PcapOutput:
             with contextlib.suppress(OSError):  # a pipe
                 os.ftruncate(self._descriptor, 0)
             self._due = self._capture.header
+        missing = 0 if self._line is None else self._line.dropped
         self._line = self._capture.line(
             looked.name,
             looked.protocol,
@@ -67,6 +68,7 @@ class PcapOutput:
             times=looked.times,
             epoch=epoch,
         )
+        self._line.dropped = missing
         self._write(self._due + self._line.header, b"")
 
     def show(self, entry: Entry) -> None:

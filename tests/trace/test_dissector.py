@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import struct
 from collections.abc import Iterator
 from decimal import Decimal
 from pathlib import Path
@@ -13,7 +14,7 @@ from nodes.sac import KIND
 from sacbus.kernel import SECOND, LineRate
 from sacbus.node import Said
 from sacbus.trace.capture import Capture
-from sacbus.trace.pcapng import packet
+from sacbus.trace.pcapng import interface, packet, section
 from sacbus.watch import Collision, Entry, Spoken, Watch
 from sacbus.wire import ack, crc8, encode
 from tests.trace.session import capture_of, everything_said
@@ -23,6 +24,8 @@ from tests.watch.rig import LINK, M400
 pytestmark = [needs_tshark, pytest.mark.slow]
 
 RATE = LineRate()
+#: Of captures that begin with the IP header.
+LINKTYPE_RAW = 101
 
 
 def spoken(entries: list[Entry]) -> list[Spoken]:
@@ -301,3 +304,34 @@ def test_a_line_of_another_protocol_is_left_alone(tmp_path: Path) -> None:
     path.write_bytes(capture.header + line.header + packet(0, 0, M400))
     assert listed(path, ["sac.type"]) == [{"sac.type": ""}]
     assert LINK not in tshark("-r", path)
+
+
+def _segment(sequence: int, payload: bytes) -> bytes:
+    """IPv4 and TCP, without checks: from port 40000 to 7000."""
+    tcp = struct.pack(">HHIIBBHHH", 40_000, 7_000, sequence, 1, 5 << 4, 0x18, 8_192, 0, 0)
+    size = 20 + len(tcp) + len(payload)
+    local = bytes((127, 0, 0, 1))
+    ip = struct.pack(">BBHHHBBH4s4s", 0x45, 0, size, sequence, 0, 64, 6, 0, local, local)
+    return ip + tcp + payload
+
+
+def test_a_connection_to_a_bus_is_decoded_when_asked_for_however_it_is_split(
+    tmp_path: Path,
+) -> None:
+    sent = M400 + b"\xff" + encode(11, 1, b"V100")
+    path = tmp_path / "tcp.pcapng"
+    pieces = ((0, 6), (6, 10), (10, 18), (18, len(sent)))
+    path.write_bytes(
+        section("test")
+        + interface("lo", "IP", link_type=LINKTYPE_RAW, bits_per_second=0)
+        + b"".join(packet(0, low, _segment(1 + low, sent[low:high])) for low, high in pieces)
+    )
+    fields = ("sac.type", "sac.body", "sac.crc.status")
+    assert {one["sac.type"] for one in listed(path, fields)} == {""}
+    told = listed(path, fields, more=("-d", "tcp.port==7000,sac"))
+    assert [tuple(one.values()) for one in told] == [
+        ("", "", ""),
+        ("packet", "m400", "right"),
+        ("garbage", "", ""),
+        ("packet", "V100", "right"),
+    ]
