@@ -222,7 +222,6 @@ local function link_answer(unit, fact)
     if not fact.inexact then
         -- An answer cannot begin before its packet ended; the clock of an arrival may say so.
         fact.time = time:tonumber() < 0 and NSTime.new(0, 0) or time
-        request.time = fact.time
     end
 end
 
@@ -333,7 +332,6 @@ local function add_packet(tree, range, unit, fact, remarks, pinfo)
     if fact.forward_in then tree:add(f.forward_in, fact.forward_in):set_generated() end
     if fact.answer then
         tree:add(f.response_in, fact.answer):set_generated()
-        if fact.time then tree:add(f.response_time, fact.time):set_generated() end
     elseif fact.complete and unit.dst ~= EVERYBODY then
         tree:add_proto_expert_info(e.no_answer)
     end

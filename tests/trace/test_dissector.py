@@ -98,7 +98,7 @@ def test_every_answer_is_told_with_its_packet_and_the_monitors_delay(tmp_path: P
             assert entry.delay is not None  # a feed's times are exact
             time = f"{Decimal(entry.delay) / SECOND:.9f}"
             expected[frames[id(entry)]] = (str(frames[id(entry.request)]), time)
-            answered[frames[id(entry.request)]] = (str(frames[id(entry)]), time)
+            answered[frames[id(entry.request)]] = (str(frames[id(entry)]), "")
     assert len(answered) > 10
     capture = capture_of(entries, tmp_path)
     fields = ("frame.number", "sac.response_to", "sac.response_in", "sac.response_time")
