@@ -297,6 +297,33 @@ def test_two_lines_in_a_capture_do_not_answer_each_other(tmp_path: Path) -> None
     ]
 
 
+def test_an_answer_on_the_other_lane_of_a_line_is_its_answer(tmp_path: Path) -> None:
+    capture = Capture()
+    line = capture.line("wire", "sac", RATE, lanes=2)
+    path = tmp_path / "lanes.pcapng"
+    path.write_bytes(
+        capture.header + line.header + packet(0, 0, M400) + packet(1, 3_000_000, ack(1, 10))
+    )
+    assert [one["sac.response_to"] for one in listed(path, ["sac.response_to"])] == ["", "1"]
+
+
+def test_an_answer_that_comes_long_after_its_packet_answers_nothing(tmp_path: Path) -> None:
+    path = raw_capture([M400, encode(11, 1, b""), b"\xff", ack(1, 10)], tmp_path / "late.pcapng")
+    (*_, late) = listed(path, ["sac.response_to", "_ws.expert.message"])
+    assert late == {
+        "sac.response_to": "",
+        "_ws.expert.message": "Answers nothing that was captured",
+    }
+
+
+def test_who_has_not_read_it_all_does_not_say_that_an_answer_is_missing(tmp_path: Path) -> None:
+    capture = capture_of(everything_said()[:2], tmp_path)
+    # With -2 alone, tshark 4.0 dissects only in its second pass.
+    for more in ((), ("-2",)):
+        told = listed(capture, ["sac.expert.no_answer"], more=more)
+        assert [one["sac.expert.no_answer"] for one in told] == ["", ""]
+
+
 def test_a_line_of_another_protocol_is_left_alone(tmp_path: Path) -> None:
     capture = Capture()
     line = capture.line("wire", "other", RATE)
