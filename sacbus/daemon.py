@@ -51,8 +51,10 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
             state = StateDirectory(configuration.state, configuration.name)
             state.claim()
             stack.callback(state.release)
-        for wanted in configuration.every_node:
-            kind = find_kind(wanted.kind)
+        nodes = configuration.every_node
+        kinds = {name: find_kind(name) for name in {one.kind for one in nodes}}
+        for wanted in nodes:
+            kind = kinds[wanted.kind]
             settings = settings_from(kind.settings, wanted.settings)
             node = kind.create(wanted.address, settings, rate, bus.tell)
             if state is not None:
