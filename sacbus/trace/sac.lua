@@ -10,7 +10,7 @@
 
 local sac = Proto("sac", "SAC network")
 
-local STX, ETX, ACK, NAK, DC1, DC2 = 0x02, 0x03, 0x06, 0x15, 0x11, 0x12
+local STX, ETX, ACK, NAK = 0x02, 0x03, 0x06, 0x15
 local EVERYBODY, MOTHER = 0, 1
 -- A frame that has not ended after so many bytes is given up, as sacbus's receiver does.
 local MAX_FRAME = 255
@@ -259,22 +259,23 @@ local function fact_of(unit, pinfo, number, remarks, times)
     return fact
 end
 
--- What a body alone tells: a soft op, a message, a line for another node.
+-- What a body alone tells: a soft op, a message, a line for another node. Of an address that is too
+-- great a device uses the low byte.
 local function read_body(unit)
     local body = unit.body
-    if body:byte(1) == DC1 and #body == 1 then
+    if body:match("^\17 *$") then
         unit.soft_op = "DC1, motion has begun"
-    elseif body:byte(1) == DC2 and #body == 1 then
+    elseif body:match("^\18 *$") then
         unit.soft_op = "DC2, motion has ended"
     elseif body:match("^[ .]") and body:match("[^ ]") then
         unit.message = body
-    else
+    elseif body:match("^%d") then
         local digits, line = body:match("^(%d+)(.*)$")
-        if digits and tonumber(digits) <= 255 then
-            unit.forward = { to = tonumber(digits), line = line }
-        elseif body:byte(1) == 0x2F then
-            unit.forward = { to = nil, line = body:sub(2) }
-        end
+        local to = 0
+        for digit in digits:gmatch("%d") do to = (to * 10 + tonumber(digit)) % 256 end
+        unit.forward = { to = to, line = line }
+    elseif body:match("^/") then
+        unit.forward = { to = nil, line = body:sub(2) }
     end
 end
 
@@ -398,11 +399,12 @@ local function show(unit, buffer, from, pinfo, parent, number, remarks, times)
 end
 
 function sac.dissector(buffer, pinfo, tree)
-    local size = buffer:reported_length_remaining()
+    local size = buffer:len()
     if size == 0 then return 0 end
     local data = buffer:raw(0, size)
     local remarks = remarks_of_frame()
-    local start = frame_time().value
+    local stamp = frame_time()
+    local start = stamp and stamp.value or NSTime.new(0, 0)
     local whole = tonumber((remarks["on the line"] or ""):match("^(%d+) ns$") or nil)
     local infos, ways = {}, {}
     pinfo.cols.protocol = "SAC"

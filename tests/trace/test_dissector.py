@@ -12,6 +12,9 @@ import pytest
 
 from nodes.sac import KIND
 from sacbus.kernel import SECOND, LineRate
+from sacbus.language import parse
+from sacbus.language.commands import Forward, Message, SoftOp
+from sacbus.monitor.page import printable
 from sacbus.node import Said
 from sacbus.trace.capture import Capture
 from sacbus.trace.pcapng import interface, packet, section
@@ -159,21 +162,35 @@ def test_lines_that_are_sent_on_and_their_originals_know_each_other(tmp_path: Pa
     ]
 
 
-def test_messages_and_soft_ops_are_told_without_our_words(tmp_path: Path) -> None:
-    frames = [
-        encode(10, 1, b" hello"),
-        encode(0, 10, b"\x11"),
-        encode(0, 10, b"\x12"),
-        encode(10, 1, b"m400"),
+def test_what_a_body_is_is_told_without_our_words_as_the_language_reads_it(tmp_path: Path) -> None:
+    chance = random.Random(1)
+    bodies = [b" hello", b".x", b".", b" ", b"", b"/m20", b"/", b"//m", b"10m50", b"85", b"256m5"]
+    bodies += [
+        b"007m5",
+        b"99999999999999999999999m5",
+        b"\x11",
+        b"\x12",
+        b"\x11  ",
+        b"\x11m",
+        b"m400",
     ]
-    capture = raw_capture(frames, tmp_path / "raw.pcapng")
-    told = listed(capture, ("sac.message", "sac.soft_op", "sac.command", "_ws.col.Info"))
-    assert [tuple(one.values()) for one in told] == [
-        (" hello", "", "", " hello"),
-        ("", "DC1, motion has begun", "", "DC1, motion has begun"),
-        ("", "DC2, motion has ended", "", "DC2, motion has ended"),
-        ("", "", "", "m400"),
-    ]
+    bodies += [bytes(chance.choices(b"\x11\x12 ./019m", k=4)) for _ in range(300)]
+    capture = raw_capture([encode(10, 1, body) for body in bodies], tmp_path / "raw.pcapng")
+    fields = ("sac.message", "sac.soft_op", "sac.forward.to", "sac.forward.line", "sac.command")
+    for body, told in zip(bodies, listed(capture, fields), strict=True):
+        assert tuple(told.values()) == (*_read(body), ""), body
+
+
+def _read(body: bytes) -> tuple[str, str, str, str]:
+    match parse(body).command:
+        case Message(text):
+            return text, "", "", ""
+        case SoftOp(start):
+            return "", "DC1, motion has begun" if start else "DC2, motion has ended", "", ""
+        case Forward(to, rest):
+            return "", "", "" if to is None else str(to), printable(rest)
+        case _:
+            return "", "", "", ""
 
 
 def test_source_destination_and_words_stand_in_the_columns(tmp_path: Path) -> None:
