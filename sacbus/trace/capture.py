@@ -68,6 +68,8 @@ class CapturedLine:
         self._epoch = epoch
         #: Lines or packets that are missing before the next block; it will say so.
         self.dropped = 0
+        #: Blocks that have been made.
+        self.count = 0
 
     def blocks(self, entry: Entry) -> bytes:
         """The block of a packet, an answer or garbage, one for each part of a collision.
@@ -95,6 +97,7 @@ class CapturedLine:
 
     def _block(self, lane: int, start: Ns, raw: bytes, remarks: dict[str, str]) -> bytes:
         dropped, self.dropped = self.dropped, 0
+        self.count += 1
         # Counted back from its arrival, a first byte may have begun before anybody listened.
         time = max(self._epoch + start, 0)
         # One comment: each counts as a remark of its own in Wireshark's "Expert Information".

@@ -26,11 +26,12 @@ TOGETHER: Final = 1 << 16
 _Hits = Mapping[int, list[tuple[Ns, Ns]]]
 
 
-def write_pcapng(recording: Recording, file: BinaryIO) -> None:
-    """Write what was said on the recorded lines, for Wireshark; times count from 1970 on.
+def write_pcapng(recording: Recording, file: BinaryIO) -> int:
+    """Write what was said on the recorded lines, for Wireshark; how many packets that were.
 
-    Reads the recording twice. KindError when no kind that is installed speaks a line's protocol;
-    else as reading it and writing the file.
+    Packets, answers and garbage count alike. Times are bus time, counted from 1970 on. Reads the
+    recording twice. KindError when no kind that is installed speaks a line's protocol; else as
+    reading it and writing the file.
     """
     capture = Capture()
     lines = [_Line(bus, capture) for bus in recording.buses]
@@ -47,6 +48,7 @@ def write_pcapng(recording: Recording, file: BinaryIO) -> None:
     for line in lines:
         batch += line.end(recording.end)
     file.write(batch)
+    return sum(line.captured.count for line in lines)
 
 
 class _Line:

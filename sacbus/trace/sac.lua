@@ -263,9 +263,9 @@ end
 -- great a device uses the low byte.
 local function read_body(unit)
     local body = unit.body
-    if body:match("^\17 *$") then
+    if body == "\17" or body:match("^\17 ") then
         unit.soft_op = "DC1, motion has begun"
-    elseif body:match("^\18 *$") then
+    elseif body == "\18" or body:match("^\18 ") then
         unit.soft_op = "DC2, motion has ended"
     elseif body:match("^[ .]") and body:match("[^ ]") then
         unit.message = body

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from nodes.sac import KIND
 from sacbus.bus import Bus, Transmission
+from sacbus.cli import run
 from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.feed.server import sent_line
 from sacbus.host import run_virtual
@@ -150,6 +152,22 @@ def test_a_protocol_that_nobody_here_speaks_is_told_in_a_line() -> None:
         "no node kind that is installed speaks 'tongues', bus left, "
         "install the package of its nodes"
     )
+
+
+def test_the_command_writes_it_and_tells_how_many_packets(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, file = tmp_path / "run.jsonl", tmp_path / "run.pcapng"
+
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10,))) as hosted:
+            with recording.open("wb") as sink, Recorder(hosted, sink):
+                await _ask(hosted)
+
+    run_virtual(Kernel(), scene())
+    assert run(["export", str(recording), "--pcap", str(file)]) == 0
+    assert capsys.readouterr().out == f"{file}: 2 packets\n"
+    assert file.read_bytes() == captured(recording.read_bytes())
 
 
 @given(
