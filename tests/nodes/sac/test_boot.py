@@ -9,8 +9,8 @@ import pytest
 from nodes.sac import SacSettings
 from nodes.sac.boot import LISTENS
 from sacbus.kernel import MS, SECOND, Ns
-from sacbus.node import ReportKind
 from sacbus.language import Parameter
+from sacbus.node import ReportKind
 from sacbus.wire import ack
 from tests.nodes.sac.bench import NODE, Bench
 

@@ -115,19 +115,8 @@ deeds = st.one_of(
     cuts,
     st.sampled_from(
         [
-            "sync=0",
-            "sync=1",
-            "estop=0",
-            "estop=1",
-            "power=0",
-            "power=1",
-            "enA=0",
-            "enB=0",
-            "enA=1",
-            "enB=1",
-            "$n",
-            "xclk=900000",
-            "xclk=0",
+            *("sync=0", "sync=1", "estop=0", "estop=1", "power=0", "power=1"),
+            *("enA=0", "enB=0", "enA=1", "enB=1", "$n", "xclk=900000", "xclk=0"),
         ]
     ),
 )
