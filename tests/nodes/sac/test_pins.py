@@ -78,7 +78,7 @@ def test_every_pin_has_a_level_and_open_inputs_are_pulled_up() -> None:
 )
 def test_what_cannot_be_driven_is_refused_in_one_line(
     pin: str,
-    value: Any,
+    value: Any,  # noqa: ANN401 (what is no level)
     said: str,
 ) -> None:
     pins = Bench().node.pins
