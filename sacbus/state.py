@@ -106,7 +106,7 @@ class StateDirectory:
                 os.fsync(file.fileno())
             fresh.replace(path)
         except OSError as fault:
-            # What keeps it from being written may keep it from being removed; the next claim does it.
+            # What kept it from being written may keep it from being removed: the next claim will.
             with contextlib.suppress(OSError):
                 fresh.unlink(missing_ok=True)
             raise self._unusable("write", path, fault) from fault

@@ -107,7 +107,12 @@ def test_a_directory_that_goes_away_meanwhile_is_told_by_the_name_that_was_given
     directory.mkdir()
     (tmp_path / "link").symlink_to(directory)
     asked = tmp_path / "link" / "result.csv"
-    with pytest.raises(NotADirectoryError) as told, fresh_file(asked):
-        directory.rename(tmp_path / "moved")
-        directory.touch()
+
+    def lose_the_directory() -> None:
+        with fresh_file(asked):
+            directory.rename(tmp_path / "moved")
+            directory.touch()
+
+    with pytest.raises(NotADirectoryError) as told:
+        lose_the_directory()
     assert told.value.filename == str(asked)

@@ -241,6 +241,19 @@ def test_a_list_of_one_shots_is_typed_from_a_pipe(capsys: Captured) -> None:
         assert bus["nodes"][0]["position_steps"] > 0
 
 
+def test_a_line_that_is_too_long_is_answered_without_its_beginning() -> None:
+    with served("--terminals", "--ephemeral") as sacbus:
+        ran = subprocess.run(
+            [sys.executable, "-m", "sacbus", "terminal", terminal(sacbus, 10)],
+            input=b"11 " + b"x" * 60 + b"\nvd\n",
+            capture_output=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+        assert (ran.returncode, ran.stderr) == (0, b"")
+        assert ran.stdout == b"2big.\n100 RPM  cycle 3000\n"
+
+
 def test_a_queue_that_was_typed_is_got_back_one_to_one(capsys: Captured, tmp_path: Path) -> None:
     rows = [one.row for one in read_rows((DATA / "companion-queue.txt").read_text().splitlines())]
     file = tmp_path / "queue.csv"
