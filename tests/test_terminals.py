@@ -167,6 +167,22 @@ def test_a_node_without_a_terminal_is_told_of_and_served_all_the_same(
     ]
 
 
+def test_a_fault_of_a_link_is_not_taken_for_a_node_without_a_terminal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> None:
+        raise KeyError("a defect of a link")
+
+    monkeypatch.setattr("sacbus.links.PtyLink.open", fail)
+
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10,), terminals=True)):
+            pass
+
+    with pytest.raises(KeyError, match="a defect of a link"):
+        asyncio.run(scene())
+
+
 def test_two_hundred_and_fifty_nodes_have_a_terminal_each(tmp_path: Path) -> None:
     path = tmp_path / "sacbus"
     options = ("--nodes", "4-253", "--pty", str(path), "--ephemeral")
