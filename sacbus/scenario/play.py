@@ -1,0 +1,359 @@
+"""A scenario as it is played: which step begins when, and what becomes of each.
+
+Owns the order of the steps and the gathering of failures. Synchronous: it is called by the clock of
+its benches, the same in virtual time, in real time and over a link; ``run.py`` moves that clock.
+
+A step begins by an event of its own, after whatever made it begin has been dealt with to its end.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Final
+
+from sacbus.kernel import Ns
+from sacbus.mother import (
+    Acknowledged,
+    MotherError,
+    NoAnswer,
+    Refused,
+    Sent,
+    UnknownOutcome,
+    addressed_line,
+)
+from sacbus.scenario.bench import Bench
+from sacbus.scenario.expectations import Shown
+from sacbus.scenario.judges import judge
+from sacbus.scenario.result import Failure, Result
+from sacbus.scenario.values import (
+    Mark,
+    Outcome,
+    Pause,
+    Pin,
+    Poll,
+    Power,
+    Raw,
+    Scenario,
+    Send,
+    Step,
+    Turn,
+    Type,
+)
+
+__all__ = ["Play", "predecessor"]
+
+#: Failures of one polling step that are told one by one; of the rest only how many there were.
+TOLD: Final = 3
+
+_OUTCOMES: Final[Mapping[type, Outcome]] = {
+    Acknowledged: "ack",
+    Sent: "ack",
+    Refused: "nak",
+    NoAnswer: "no answer",
+    UnknownOutcome: "unknown",
+}
+
+
+def predecessor(steps: tuple[Step, ...], index: int) -> int | None:
+    """The step whose end a step waits for; None for one that begins by the clock or with the play.
+
+    A name is that of the nearest step above; or else of the first one below.
+    """
+    step = steps[index]
+    if step.at is not None:
+        return None
+    if not isinstance(step.after, str):
+        return index - 1 if index else None
+    order = [*range(index - 1, -1, -1), *range(index + 1, len(steps))]
+    return next((other for other in order if steps[other].name == step.after), None)
+
+
+class Play:
+    """One run of a scenario on its benches, by the names of the buses; the first is the default."""
+
+    def __init__(self, scenario: Scenario, benches: Mapping[str, Bench]) -> None:
+        self.result = Result(scenario)
+        self.over = False
+        #: Called once, when it is over.
+        self.when_over: Callable[[], object] | None = None
+        self._scenario = scenario
+        self._benches = benches
+        self._first = next(iter(benches.values()))
+        self._clock = self._first.clock
+        self._origin: Ns = 0
+        self._followers: defaultdict[int, list[int]] = defaultdict(list)
+        self._open = set(range(len(scenario.steps)))
+        #: Polls that go on to the end.
+        self._background: set[int] = set()
+
+    def begin(self) -> None:
+        """Time 0 is now."""
+        self._origin = self._clock.now
+        for bench in self._benches.values():
+            bench.begin(self._origin)
+        steps = self._scenario.steps
+        for index, step in enumerate(steps):
+            for deed in (step.does, step.after):
+                if isinstance(deed, Shown):
+                    self._bench(deed.bus).listen(deed.node)
+            before = predecessor(steps, index)
+            if before is not None:
+                self._followers[before].append(index)
+            else:
+                self._clock.at(self._origin + (step.at or 0) + step.wait, self._meet, index)
+        if self._scenario.end is not None:
+            self._clock.at(self._origin + self._scenario.end, self._end)
+        elif not steps:
+            self._end()
+
+    # ---- the order of steps ----
+
+    def _meet(self, index: int) -> None:
+        """A step's time has come; what it waits for first may not have."""
+        if self.over:
+            return
+        step = self._scenario.steps[index]
+        if step.after is None or isinstance(step.after, str):
+            self._do(index)
+            return
+
+        def met(got: str | None) -> None:
+            if got is None:
+                self._clock.at(self._clock.now, self._do, index)
+            else:
+                self._settle(index, str(step.after), got)
+
+        judge(step.after, self._bench(step.after.bus), met).begin()
+
+    def _do(self, index: int) -> None:
+        if self.over:
+            return
+        step = self._scenario.steps[index]
+        match step.does:
+            case Send() as send:
+                self._send(index, send, 0)
+            case Poll() as poll:
+                self._begin_poll(index, poll)
+            case Raw(data, bus):
+                bench = self._bench(bus)
+                bench.talk(data)
+                self._clock.at(self._clock.now + bench.span(len(data)), self._sent, index, bench)
+            case Pause() | Mark():
+                self._settle(index)
+            case Type() | Pin() | Turn() | Power() as deed:
+                self._handle(deed)
+                self._settle(index)
+            case expected:
+                self.result.expectations += 1
+                wanted = str(expected)
+                verdict = partial(self._settle, index, wanted)
+                judge(expected, self._bench(expected.bus), verdict).begin()
+
+    def _handle(self, deed: Type | Pin | Turn | Power) -> None:
+        bench = self._bench(deed.bus)
+        for address in deed.nodes:
+            panel = bench.panels[address]
+            match deed:
+                case Type(keys=keys):
+                    assert panel.console is not None, "the rules have looked for a terminal"
+                    panel.console.type(keys)
+                case Pin(levels=levels):
+                    for pin, level in levels.items():
+                        panel.drive(pin, level)
+                case Turn(detents=detents):
+                    panel.turn(detents)
+                case Power(on=on):
+                    panel.power(on=on)
+
+    def _settle(self, index: int, expected: str = "", got: str | None = None) -> None:
+        """A step is over, and what came of it if that was not as expected."""
+        if index not in self._open or self.over:
+            return
+        if got is not None:
+            self._fail(index, expected, got)
+        self._open.discard(index)
+        self._release(index)
+
+    def _release(self, index: int) -> None:
+        now = self._clock.now
+        for follower in self._followers[index]:
+            self._clock.at(now + self._scenario.steps[follower].wait, self._meet, follower)
+        if self._open <= self._background and self._scenario.end is None:
+            self._clock.at(now, self._end)
+
+    def _end(self) -> None:
+        if self.over:
+            return
+        for index in sorted(self._open - self._background):
+            what = self._scenario.steps[index].does
+            self._fail(index, f"{_called(what)} to be over by the end", "that it was not")
+        self.over = True
+        self.result.ended = self._clock.now - self._origin
+        self.result.counts = {name: bench.counts() for name, bench in self._benches.items()}
+        if self.when_over is not None:
+            self.when_over()
+
+    def _fail(self, index: int, expected: str, got: str) -> None:
+        step = self._scenario.steps[index]
+        bench = self._bench(getattr(step.does, "bus", ""))
+        self.result.failures.append(
+            Failure(
+                self._clock.now - self._origin,
+                expected,
+                got,
+                step.name,
+                step.place,
+                bench.line.words(self._origin),
+                self._states(bench, step.does),
+            )
+        )
+
+    def _states(self, bench: Bench, deed: object) -> tuple[str, ...]:
+        """The nodes that a step is about, as they are now."""
+        nodes = getattr(deed, "nodes", None) or ()
+        found = []
+        for address in nodes[:4]:
+            if address in bench.panels:
+                seen = bench.panels[address].snapshot()
+                command = f", {seen.current}" if seen.current else ""
+                found.append(
+                    f"node {address}: {seen.state} at {seen.position_steps:g}, "
+                    f"{seen.rpm:g} RPM{command}"
+                )
+        return tuple(found)
+
+    def _bench(self, name: str) -> Bench:
+        return self._benches[name] if name else self._first
+
+    # ---- mother ----
+
+    def _send(self, index: int, send: Send, number: int) -> None:
+        bench = self._bench(send.bus)
+        line = send.lines[number]
+
+        def done(outcome: Acknowledged | Sent | MotherError) -> None:
+            if self.over:
+                return
+            got = _outcome(outcome)
+            if send.outcome not in ("any", got):
+                self._settle(index, f"{line!r} to end in {send.outcome}", _told(outcome))
+            elif number + 1 < len(send.lines):
+                self._send(index, send, number + 1)
+            else:
+                self._settle(index)
+
+        _ask(bench, line, done, accept_duplicates=send.accept_duplicates)
+
+    def _begin_poll(self, index: int, poll: Poll) -> None:
+        polling = _Polling(self._bench(poll.bus), poll, partial(self._poll_failed, index))
+        self._background.add(index)
+        polling.begin(lambda: not self.over)
+        if poll.lasting is not None:
+            self._background.discard(index)
+            self._clock.at(self._clock.now + poll.lasting, self._poll_over, index, polling)
+        else:
+            self._release(index)
+
+    def _poll_failed(self, index: int, expected: str, got: str) -> None:
+        if not self.over:
+            self._fail(index, expected, got)
+
+    def _poll_over(self, index: int, polling: _Polling) -> None:
+        polling.stop()
+        self._settle(index)
+
+    def _sent(self, index: int, bench: Bench) -> None:
+        """Raw bytes should be out by now; they are not while the line was taken."""
+        if waiting := bench.unsent():
+            self._clock.at(self._clock.now + bench.span(waiting), self._sent, index, bench)
+        elif bench.busy(self._clock.now):
+            self._clock.at(self._clock.now + bench.span(1), self._sent, index, bench)
+        else:
+            self._settle(index)
+
+
+class _Polling:
+    """Lines sent in turn at a pace. Each costs an appointment, and no task of a loop."""
+
+    def __init__(self, bench: Bench, poll: Poll, failed: Callable[[str, str], None]) -> None:
+        self._bench = bench
+        self._poll = poll
+        self._failed = failed
+        self._requests = [(*addressed_line(line), line) for line in poll.lines]
+        self._next = 0
+        self._due: Ns = 0
+        self._failures = 0
+        self._goes_on: Callable[[], bool] = lambda: True
+        self._stopped = False
+
+    def begin(self, goes_on: Callable[[], bool]) -> None:
+        self._goes_on = goes_on
+        self._due = self._bench.clock.now
+        self._ask()
+
+    def stop(self) -> None:
+        """Ask no more."""
+        self._stopped = True
+
+    def _ask(self) -> None:
+        if self._stopped or not self._goes_on():
+            return
+        node, command, _ = self._requests[self._next]
+        self._due += self._poll.every
+        caller = self._bench.caller
+        body = command.encode("latin-1")
+        if node == 0:
+            caller.broadcast(body, self._done)
+        else:
+            caller.call(node, body, self._done)
+
+    def _done(self, outcome: Acknowledged | Sent | MotherError) -> None:
+        wanted = self._poll.outcome
+        if wanted not in ("any", _outcome(outcome)):
+            self._failures += 1
+            if self._failures <= TOLD:
+                line = self._requests[self._next][2]
+                more = ", and is not told of again" if self._failures == TOLD else ""
+                self._failed(f"poll {line!r} to end in {wanted}", f"{_told(outcome)}{more}")
+        self._next = (self._next + 1) % len(self._requests)
+        clock = self._bench.clock
+        clock.at(max(self._due, clock.now), self._ask)
+
+
+def _ask(
+    bench: Bench,
+    line: str,
+    done: Callable[[Acknowledged | Sent | MotherError], None],
+    *,
+    accept_duplicates: bool,
+) -> None:
+    node, command = addressed_line(line)
+    body = command.encode("latin-1")
+    if node == 0:
+        bench.caller.broadcast(body, done)
+    else:
+        bench.caller.call(node, body, done, accept_duplicates=accept_duplicates)
+
+
+def _outcome(outcome: Acknowledged | Sent | MotherError) -> Outcome:
+    return _OUTCOMES.get(type(outcome), "lost")
+
+
+def _told(outcome: Acknowledged | Sent | MotherError) -> str:
+    """An outcome in words."""
+    if isinstance(outcome, MotherError):
+        return f"{_outcome(outcome)} ({outcome})"
+    return _outcome(outcome)
+
+
+def _called(deed: object) -> str:
+    """What a step is called where it has not come about."""
+    match deed:
+        case Send(lines=lines) | Poll(lines=lines):
+            return f"{lines[0]!r}"
+        case Raw() | Type() | Pin() | Turn() | Power() | Pause() | Mark():
+            return f"the {type(deed).__name__.lower()}"
+        case _:
+            return str(deed)

@@ -1,0 +1,135 @@
+"""Running scenarios: in virtual time, in real time over a pty, or on a line behind a link.
+
+Owns what moves the clock of a play, and the order of opening and closing. The first is the same in
+every run; the other two are as punctual as the machine.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+from collections.abc import Callable
+from contextlib import AsyncExitStack
+from typing import Final
+
+from sacbus.configuration import Configuration, check
+from sacbus.daemon import open_bus
+from sacbus.host import Standstill, run_virtual
+from sacbus.hosted import HostedBus
+from sacbus.kernel import Kernel, LineRate, Ns
+from sacbus.links import PtyLink, open_line
+from sacbus.mother.mother import LINK_SLACK, LoopClock
+from sacbus.scenario.bench import Bench, far_bench, hosted_bench, piped_bench
+from sacbus.scenario.play import Play
+from sacbus.scenario.result import Result
+from sacbus.scenario.rules import refuse
+from sacbus.scenario.values import Scenario
+
+__all__ = ["run", "run_on_link", "run_real"]
+
+#: Events of the bus between two looks at whether somebody wants to end it, some ms of wall time.
+SLICE: Final = 4_096
+
+#: Told of the bus time that a scenario has come to, now and then.
+Progress = Callable[[Ns], None]
+
+
+def run(scenario: Scenario, *, progress: Progress | None = None) -> Result:
+    """Play a scenario in virtual time; ConfigError for one that cannot be played.
+
+    ``progress`` is called every :data:`SLICE` events of the bus.
+    """
+    refuse(scenario)
+    kernel = Kernel()
+    return run_virtual(kernel, _virtually(scenario, kernel, progress))
+
+
+async def _virtually(scenario: Scenario, kernel: Kernel, progress: Progress | None) -> Result:
+    async with AsyncExitStack() as stack:
+        hosted = await _host(stack, [_alone(bus) for bus in scenario.buses])
+        play = Play(scenario, {one.configuration.name: hosted_bench(one) for one in hosted})
+        play.begin()
+        ran = 0
+        while not play.over:
+            # Here, not in the loop's selector, which costs more than most events.
+            if not kernel.run_next():
+                raise Standstill("nothing is due, and the scenario is not over")
+            ran += 1
+            if ran % SLICE == 0:
+                if progress is not None:
+                    progress(kernel.now)
+                await asyncio.sleep(0)  # Ctrl-C
+        return play.result
+
+
+def run_real(scenario: Scenario, *, speed: float = 1.0, progress: Progress | None = None) -> Result:
+    """Play a scenario in real time, times ``speed``; mother is a program at a pty of each bus."""
+    refuse(scenario)
+    return asyncio.run(_really(scenario, speed, progress))
+
+
+async def _really(scenario: Scenario, speed: float, progress: Progress | None) -> Result:
+    async with AsyncExitStack() as stack:
+        buses = [dataclasses.replace(bus, speed=speed) for bus in scenario.buses]
+        hosted = await _host(stack, buses)
+        benches: dict[str, Bench] = {}
+        for bus in hosted:
+            pty = PtyLink(None, baud=bus.bus.rate.baud)
+            bus.attach(pty)
+            line = await stack.enter_async_context(open_line(pty.where, bus.bus.rate.baud))
+            bench = piped_bench(bus, line, round(LINK_SLACK * speed))
+            bench.look = round(bench.look * max(speed, 1.0))
+            benches[bus.configuration.name] = bench
+        play = Play(scenario, benches)
+        over = asyncio.get_running_loop().create_future()
+        play.when_over = lambda: over.set_result(None)
+        first = hosted[0]
+        first.host.arrive(play.begin)
+        await _until(over, progress, first.now)
+        return play.result
+
+
+def run_on_link(scenario: Scenario, link: str, *, progress: Progress | None = None) -> Result:
+    """Play a scenario with the nodes at the far end of a link: a serial port, a pty, a server.
+
+    ConfigError, with nothing sent, for steps that take more than a line.
+    """
+    refuse(scenario, line_only=True)
+    return asyncio.run(_far(scenario, link, progress))
+
+
+async def _far(scenario: Scenario, link: str, progress: Progress | None) -> Result:
+    (bus,) = scenario.buses
+    protocol = check(bus)
+    rate = LineRate(bus.baud or protocol.rate.baud, protocol.rate.bits)
+    loop = asyncio.get_running_loop()
+    async with open_line(link, rate.baud) as line:
+        clock = LoopClock(loop)
+        bench = far_bench(bus.name, clock, protocol, line, rate, LINK_SLACK)
+        play = Play(scenario, {bus.name: bench})
+        over = loop.create_future()
+        play.when_over = lambda: over.set_result(None)
+        play.begin()
+        await _until(over, progress, lambda: clock.now)
+        return play.result
+
+
+async def _until(
+    over: asyncio.Future[None], progress: Progress | None, now: Callable[[], Ns]
+) -> None:
+    while progress is not None and not over.done():
+        progress(now())
+        await asyncio.wait([over], timeout=0.2)
+    await over
+
+
+async def _host(stack: AsyncExitStack, buses: list[Configuration]) -> list[HostedBus]:
+    hosted = [await stack.enter_async_context(open_bus(bus)) for bus in buses]
+    for bus in hosted:
+        await bus.booted()
+    return hosted
+
+
+def _alone(bus: Configuration) -> Configuration:
+    """A bus in virtual time: nobody outside can keep up with it, so nobody is let in."""
+    return dataclasses.replace(bus, links=(), terminals=False, speed=1.0)
