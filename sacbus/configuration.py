@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -78,6 +79,8 @@ def check(configuration: Configuration) -> Protocol:
         raise SettingError(f"lanes: expected 1 or 2, got {configuration.lanes}")
     protocol = find_kind(configuration.kind).protocol
     seen: set[int] = set()
+    # Each kind is looked for once: that reads the metadata of all that is installed.
+    found = cache(find_kind)
     nodes = configuration.every_node
     for number, node in enumerate(nodes):
         if not 4 <= node.address <= 255:
@@ -85,7 +88,7 @@ def check(configuration: Configuration) -> Protocol:
         if node.address in seen:
             raise SettingError(f"nodes: expected every address once, got {node.address} twice")
         seen.add(node.address)
-        kind = find_kind(node.kind)
+        kind = found(node.kind)
         settings_from(kind.settings, node.settings)
         if number == 0:
             protocol = kind.protocol

@@ -12,7 +12,7 @@ from sacbus.scenario.expectations import (
     Shown,
     Silent,
 )
-from sacbus.scenario.quantity import Bounds, bounds, time
+from sacbus.scenario.quantity import Bounds, bounds, nanoseconds
 from sacbus.scenario.reading import read
 from sacbus.scenario.result import Failure, Result
 from sacbus.scenario.run import run, run_on_link, run_real
@@ -52,9 +52,9 @@ __all__ = [
     "Turn",
     "Type",
     "bounds",
+    "nanoseconds",
     "read",
     "run",
     "run_on_link",
     "run_real",
-    "time",
 ]

@@ -12,7 +12,7 @@ from typing import Final
 from sacbus.config.keys import Key
 from sacbus.config.notation import NotationError, addresses
 from sacbus.scenario.parameters import RESERVED, is_value
-from sacbus.scenario.quantity import TIME, QuantityError, bounds, time
+from sacbus.scenario.quantity import TIME, QuantityError, bounds, nanoseconds
 
 __all__ = [
     "DEEDS",
@@ -36,7 +36,7 @@ _NODES: Final = 'an address, addresses like "10-12,85", or "all"'
 
 def _is_time(value: object) -> bool:
     try:
-        time(value)
+        nanoseconds(value)
     except QuantityError:
         return False
     return True

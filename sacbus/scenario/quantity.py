@@ -15,7 +15,7 @@ from typing import Final, TypeGuard
 from sacbus.config.keys import shown
 from sacbus.kernel import MS, SECOND, US, Ns
 
-__all__ = ["LONGEST", "TIME", "Bounds", "QuantityError", "bounds", "time", "time_text"]
+__all__ = ["LONGEST", "TIME", "Bounds", "QuantityError", "bounds", "nanoseconds", "time_text"]
 
 #: How a time is asked for.
 TIME: Final = 'a time such as "250 ms" (ns, us, ms, s, min, h)'
@@ -39,7 +39,7 @@ class QuantityError(ValueError):
     """A text or value that is no such quantity; the text is ``expected …, got …``."""
 
 
-def time(value: object) -> Ns:
+def nanoseconds(value: object) -> Ns:
     """``"1.5 s"`` in ns. 0 needs its unit as well, so that nobody has to guess."""
     found = _TIME.fullmatch(value) if isinstance(value, str) else None
     if found is None or found[2] not in _UNITS:

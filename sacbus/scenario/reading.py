@@ -19,7 +19,7 @@ from sacbus.config.table import Table
 from sacbus.configuration import Configuration
 from sacbus.scenario.keys import TOP
 from sacbus.scenario.parameters import MOST_CASES, Value, cases, put_in
-from sacbus.scenario.quantity import time
+from sacbus.scenario.quantity import nanoseconds
 from sacbus.scenario.rules import complaints
 from sacbus.scenario.steps import StepReader, Written
 from sacbus.scenario.values import Scenario
@@ -84,7 +84,7 @@ class _CaseReader:
             str(self._put("title", top.get("title", Path(self._source.name).stem))),
             buses,
             steps,
-            time(top.get("end")) if "end" in top.values else None,
+            nanoseconds(top.get("end")) if "end" in top.values else None,
             dict(varying),
             self._source.name,
         )

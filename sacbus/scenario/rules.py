@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from sacbus.config.mistake import ConfigError, Mistake
 from sacbus.config.notation import ranges
@@ -130,6 +131,7 @@ class _Rules:
         self._scenario = scenario
         self._buses = {bus.name: bus for bus in scenario.buses}
         self._aside: dict[tuple[str, int], Node] = {}
+        self._kind = cache(find_kind)
 
     def of(self, index: int, step: Step) -> Iterator[_Found]:
         yield from self._times(index, step)
@@ -278,7 +280,7 @@ class _Rules:
                 continue
             made = (bus.name, at.address)
             if made not in self._aside:
-                kind = find_kind(at.kind)
+                kind = self._kind(at.kind)
                 settings = settings_from(kind.settings, at.settings)
                 self._aside[made] = kind.create(at.address, settings, LineRate(), _ignore)
             yield at.address, self._aside[made]

@@ -39,7 +39,7 @@ from sacbus.scenario.keys import (
     TYPE,
 )
 from sacbus.scenario.parameters import Value, put_in
-from sacbus.scenario.quantity import bounds, time
+from sacbus.scenario.quantity import bounds, nanoseconds
 from sacbus.scenario.values import (
     Deed,
     Mark,
@@ -286,7 +286,7 @@ class StepReader:
             case "packet":
                 return self._packet(table, within, bus)
             case "silence":
-                return Silent(time(table.get("silence")), table.get("from"), bus)
+                return Silent(nanoseconds(table.get("silence")), table.get("from"), bus)
             case _:
                 counts = {
                     name: bounds(table.get(name))
@@ -336,7 +336,7 @@ def _has(table: Table, *names: str) -> bool:
 
 
 def _time(table: Table, name: str) -> Ns | None:
-    return time(table.get(name)) if name in table.values else None
+    return nanoseconds(table.get(name)) if name in table.values else None
 
 
 def _bounds(table: Table, name: str) -> Any:  # noqa: ANN401
