@@ -9,14 +9,14 @@ from __future__ import annotations
 import asyncio
 import dataclasses
 from collections.abc import Callable
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from typing import Final
 
 from sacbus.configuration import Configuration, check
 from sacbus.daemon import open_bus
 from sacbus.host import Standstill, run_virtual
 from sacbus.hosted import HostedBus
-from sacbus.kernel import Kernel, LineRate, Ns
+from sacbus.kernel import SECOND, Kernel, LineRate, Ns
 from sacbus.links import PtyLink, open_line
 from sacbus.mother.mother import LINK_SLACK, LoopClock
 from sacbus.scenario.bench import Bench, far_bench, hosted_bench, piped_bench
@@ -27,8 +27,8 @@ from sacbus.scenario.values import Scenario
 
 __all__ = ["run", "run_on_link", "run_real"]
 
-#: Events of the bus between two looks at whether somebody wants to end it, some ms of wall time.
-SLICE: Final = 4_096
+#: Bus time between two looks at whether somebody wants to end it: some ms of wall time at most.
+SLICE: Final[Ns] = SECOND
 
 #: Told of the bus time that a scenario has come to, now and then.
 Progress = Callable[[Ns], None]
@@ -37,7 +37,7 @@ Progress = Callable[[Ns], None]
 def run(scenario: Scenario, *, progress: Progress | None = None) -> Result:
     """Play a scenario in virtual time; ConfigError for one that cannot be played.
 
-    ``progress`` is called every :data:`SLICE` events of the bus.
+    ``progress`` is called every :data:`SLICE` of bus time.
     """
     refuse(scenario)
     kernel = Kernel()
@@ -48,18 +48,25 @@ async def _virtually(scenario: Scenario, kernel: Kernel, progress: Progress | No
     async with AsyncExitStack() as stack:
         hosted = await _host(stack, [_alone(bus) for bus in scenario.buses])
         play = Play(scenario, {one.configuration.name: hosted_bench(one) for one in hosted})
-        play.begin()
-        ran = 0
-        while not play.over:
-            # Here, not in the loop's selector, which costs more than most events.
-            if not kernel.run_next():
-                raise Standstill("nothing is due, and the scenario is not over")
-            ran += 1
-            if ran % SLICE == 0:
+        play.when_over = _end
+        with suppress(_Over):
+            play.begin()
+            # The kernel is run here, not by the loop's selector, which costs more than an event.
+            while (when := kernel.next_at()) is not None:
+                kernel.run_due(when + SLICE)
                 if progress is not None:
                     progress(kernel.now)
-                await asyncio.sleep(0)  # Ctrl-C
+                await asyncio.sleep(0)  # for Ctrl-C
+            raise Standstill("nothing is due, and the scenario is not over")
         return play.result
+
+
+class _Over(Exception):
+    """Leaves the kernel at the very event with which a play is over."""
+
+
+def _end() -> None:
+    raise _Over
 
 
 def run_real(scenario: Scenario, *, speed: float = 1.0, progress: Progress | None = None) -> Result:
