@@ -21,7 +21,7 @@ from sacbus.links import Link, Tuning
 from sacbus.links.link import Server
 from sacbus.mother import Mother
 from sacbus.node import BOOT, Heard, Node, Report, ReportKind, Snapshot
-from sacbus.panel import Panel
+from sacbus.panel import Deed, Panel
 from sacbus.saving import AtOnce, Saving, Thread
 from sacbus.state import StateDirectory, StateError
 
@@ -46,8 +46,10 @@ class HostedBus:
         self.terminals: dict[int, Link] = {}
         #: By the identity of the node, which lasts as long as its bus.
         self._panels: dict[int, Panel] = {}
+        #: Called with each deed that is done to a node at its panel, once it is done.
+        self.deeds: list[Callable[[Node, Deed], object]] = []
         #: Nodes in the order of the configuration, whose addresses name their memory.
-        self._configured = tuple(zip(configuration.every_node, bus.nodes, strict=True))
+        self.configured = tuple(zip(configuration.every_node, bus.nodes, strict=True))
 
     @property
     def talkers(self) -> int:
@@ -97,7 +99,7 @@ class HostedBus:
         LinkError when the link cannot be had, KeyError when the node has no terminal, as in
         :meth:`terminal`. It is closed with the bus.
         """
-        node = next((node for at, node in self._configured if at.address == address), None)
+        node = next((node for at, node in self.configured if at.address == address), None)
         if node is None:
             raise KeyError(f"no node {address} on {self.bus.name}")
         self._console(node).open(link)
@@ -112,7 +114,7 @@ class HostedBus:
     def _panel(self, node: Node) -> Panel:
         panel = self._panels.get(id(node))
         if panel is None:
-            panel = self._panels[id(node)] = Panel(node, self.bus, self.host)
+            panel = self._panels[id(node)] = Panel(node, self.bus, self.host, self.deeds)
         return panel
 
     async def booted(self) -> None:
@@ -252,11 +254,11 @@ class HostedBus:
 
         virtual = isinstance(self.host, VirtualHost)
         saving = AtOnce(state, failed) if virtual else Thread(state, failed)
-        for wanted, node in self._configured:
+        for wanted, node in self.configured:
             node.memory_changed = partial(_save, saving, wanted, node)
 
         def end() -> None:
-            for _, node in self._configured:
+            for _, node in self.configured:
                 node.memory_changed = None
             saving.close()
 
@@ -265,7 +267,7 @@ class HostedBus:
     def save(self, state: StateDirectory) -> None:
         """Write every node's memory; StateError for the first that could not be written."""
         failed: StateError | None = None
-        for wanted, node in self._configured:
+        for wanted, node in self.configured:
             try:
                 state.save(wanted.address, wanted.kind, node.persist())
             except StateError as fault:  # the others' memories are worth no less

@@ -19,6 +19,7 @@ from typing import Any, Final
 from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
+from sacbus.movement import Movement, Segment
 
 __all__ = [
     "BOOT",
@@ -221,6 +222,11 @@ class Node(Contract):
     @property
     def pins(self) -> Pins | None:
         """Its pins, made when first asked for; None for a kind without any."""
+        ...
+
+    @property
+    def movement(self) -> Movement | None:
+        """Its motion, for who records it; made when first asked for; None for what never moves."""
         ...
 
     @property
@@ -435,6 +441,22 @@ class NodeKind(Contract):
         tell: Callable[[Report], None],
     ) -> Node:
         """A new node with factory memory; ``tell`` takes what it reports out of band."""
+        ...
+
+    def shape(self, stored: Mapping[str, Any]) -> object:
+        """What segments of motion have in common, as nodes of this kind told it; read once for all.
+
+        LookupError, TypeError or ValueError for what none of them tells.
+        """
+        ...
+
+    def segment(
+        self,
+        since: Ns,
+        shape: Any,  # noqa: ANN401 (what the kind's own ``shape`` gave)
+        values: Mapping[str, Any],
+    ) -> Segment:
+        """What a node of this kind told of its motion at ``since``; errors as in :meth:`shape`."""
         ...
 
     def memory_words(self, memory: Mapping[str, object], address: int | None) -> MemoryWords:

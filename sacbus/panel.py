@@ -7,8 +7,8 @@ is the node's affair.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, NamedTuple
 
 from sacbus.bus import Bus
 from sacbus.console import Console
@@ -16,13 +16,36 @@ from sacbus.host import Host
 from sacbus.kernel import Ns
 from sacbus.node import Node, PinError, Pins, Snapshot
 
-__all__ = ["ENCODER", "Panel"]
+__all__ = ["ENCODER", "Deed", "Drive", "Panel", "Power", "Turn"]
 
 #: The encoder's inputs, by the names that a node with an encoder gives them.
 ENCODER: Final = ("enA", "enB")
 
 #: What becomes of them in the four quarters of a clockwise detent, from rest, both high.
 _QUARTERS: Final = ((0, 0), (1, 0), (0, 1), (1, 1))
+
+
+class Drive(NamedTuple):
+    """An input is driven to a level."""
+
+    pin: str
+    level: int
+
+
+class Turn(NamedTuple):
+    """The encoder is turned by so many detents, clockwise positive."""
+
+    detents: int
+
+
+class Power(NamedTuple):
+    """The node is switched on or off."""
+
+    on: bool
+
+
+#: What is done to a node at its panel, for who records it.
+Deed = Drive | Turn | Power
 
 
 class Panel:
@@ -41,8 +64,16 @@ class Panel:
     does not have are refused with PinError, a line that a user can act on.
     """
 
-    def __init__(self, node: Node, bus: Bus, host: Host) -> None:
+    def __init__(
+        self,
+        node: Node,
+        bus: Bus,
+        host: Host,
+        deeds: Sequence[Callable[[Node, Deed], object]] = (),
+    ) -> None:
+        """``deeds``: who is told of each deed once it is done, at the same instant."""
         self.node = node
+        self._deeds = deeds
         self._bus = bus
         self._host = host
         self._console: Console | None = None
@@ -66,7 +97,12 @@ class Panel:
     def drive(self, pin: str, level: int) -> None:
         """Drive an input to a level now; xclk: to a frequency in Hz."""
         pins = self._pins()
-        self._do(lambda now: pins.drive(pin, level, now))
+
+        def drive(now: Ns) -> None:
+            pins.drive(pin, level, now)
+            self._done(Drive(pin, level))
+
+        self._do(drive)
 
     def turn(self, detents: int) -> None:
         """Turn the encoder by so many detents, clockwise positive, all of them now."""
@@ -77,12 +113,18 @@ class Panel:
                 for which, level in _QUARTERS:
                     # Counterclockwise the second one goes before the first.
                     pins.drive(ENCODER[which if detents > 0 else 1 - which], level, now)
+            self._done(Turn(detents))
 
         self._do(quarters)
 
     def power(self, *, on: bool) -> None:
         """Switch the node off, or on again for a cold boot; nothing if it is that already."""
-        self._do(lambda now: self.node.power(on=on, now=now))
+
+        def switch(now: Ns) -> None:
+            self.node.power(on=on, now=now)
+            self._done(Power(on))
+
+        self._do(switch)
 
     def watch(self, watcher: Callable[[str, int, Ns], object]) -> Callable[[], None]:
         """Have ``watcher(pin, level, when)`` called at each edge of an output from now on.
@@ -101,6 +143,10 @@ class Panel:
                     self._do(lambda now: self._pins().watch(None, now))
 
         return end
+
+    def _done(self, deed: Deed) -> None:
+        for watcher in self._deeds:
+            watcher(self.node, deed)
 
     def _tell(self, pin: str, level: int, when: Ns) -> None:
         for watcher in tuple(self._watchers):

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Any, Final
 
+from nodes.sac.movement import SacSegment, SacShape
 from nodes.sac.node import SacNode
 from nodes.sac.protocol import SAC_PROTOCOL, SacProtocol
 from nodes.sac.settings import SacSettings
 from nodes.sac.words import memory_words
-from sacbus.kernel import LineRate
+from sacbus.kernel import LineRate, Ns
 from sacbus.node import MemoryWords, Report
 
-__all__ = ["KIND", "SacKind", "SacNode", "SacProtocol", "SacSettings"]
+__all__ = ["KIND", "SacKind", "SacNode", "SacProtocol", "SacSegment", "SacSettings"]
 
 
 class SacKind:
@@ -28,6 +29,14 @@ class SacKind:
     ) -> SacNode:
         """A node with factory memory at ``address``."""
         return SacNode(address, settings, rate, tell)
+
+    def shape(self, stored: Mapping[str, Any]) -> SacShape:
+        """Profile and board of segments of motion."""
+        return SacShape(stored)
+
+    def segment(self, since: Ns, shape: SacShape, values: Mapping[str, Any]) -> SacSegment:
+        """What a SAC told of its motion at ``since``."""
+        return SacSegment(since, shape, values)
 
     def memory_words(self, memory: Mapping[str, object], address: int | None) -> MemoryWords:
         """Parameters, pin map and saved queue in words."""

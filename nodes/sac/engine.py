@@ -17,8 +17,9 @@ from typing import Final, NamedTuple
 
 from sacbus.kernel import Ns
 from sacbus.motion import TICKS_PER_US, Entry, Profile, Slip, State, Timebase, lost, slips
+from sacbus.motion.ramp import Ticks64
 
-__all__ = ["Engine", "Where"]
+__all__ = ["Engine", "Standing", "Where"]
 
 #: A tick of an oscillator without error.
 NOMINAL: Final = Timebase()
@@ -45,6 +46,19 @@ class _Left(NamedTuple):
     until: Ns = 0
     rpm: float = 0.0
     stalled: bool = False
+
+
+class Standing(NamedTuple):
+    """All that tells where an engine stands and how it goes on, as long as nobody interferes."""
+
+    clock: Timebase
+    rest: Where
+    profile: Profile | None
+    sign: int
+    anchor: Ns
+    tick: int
+    started: Ns | None
+    entry: Entry
 
 
 #: What most engines hold most of the time, one for all of them.
@@ -96,6 +110,56 @@ class Engine:
         self.started: Ns | None = 0
         #: When the present profile's last period runs out; None when it never does, or none runs.
         self.end: Ns | None = None
+
+    @classmethod
+    def of(cls, standing: Standing) -> Engine:
+        """An engine that stands and goes on like this; to be asked, not to be driven."""
+        engine = cls(standing.clock)
+        engine._rest = standing.rest
+        engine._sign = standing.sign
+        engine._anchor = standing.anchor
+        engine._tick = standing.tick
+        engine.started = standing.started
+        engine._entry = standing.entry
+        engine._profile = standing.profile
+        if standing.profile is not None and standing.profile.duration is not None:
+            engine.end = engine.when(standing.profile.duration)
+        return engine
+
+    @property
+    def standing(self) -> Standing:
+        """Where it stands and how it goes on."""
+        return Standing(
+            self.clock,
+            self._rest,
+            self._profile,
+            self._sign,
+            self._anchor,
+            self._tick,
+            self.started,
+            self._entry,
+        )
+
+    def stands_as(self, standing: Standing) -> bool:
+        """Whether nothing has interfered since; cheap, as it is asked after whatever happens."""
+        return (
+            self._profile is standing.profile
+            and self._rest is standing.rest
+            and self.clock is standing.clock
+        )
+
+    def when(self, tick: int) -> Ns | None:
+        """When a tick of the present profile begins; None while no clock comes."""
+        return self._anchor + self.clock.span(tick - self._tick) if self.clock.runs else None
+
+    def whens(self, ticks: Ticks64) -> Ticks64:
+        """:meth:`when` of many ticks; the clock must run."""
+        return self._anchor + self.clock.spans(ticks - self._tick)
+
+    def ticks_before(self, moment: Ns) -> int:
+        """The first tick of the present profile that does not begin before ``moment``."""
+        # It begins at the first whole ns at or after its time, so strictly after the ns before.
+        return self._ticks(moment - 1) + 1
 
     @property
     def profile(self) -> Profile | None:

@@ -13,6 +13,7 @@ from nodes.sac.command import CommandProcessor, shortest
 from nodes.sac.engine import Engine
 from nodes.sac.memory import Memory
 from nodes.sac.message import MessageProcessor
+from nodes.sac.movement import SacMovement
 from nodes.sac.network import NetworkPort
 from nodes.sac.pins import SacPins
 from nodes.sac.ports import Exchanged, HardwarePort, understand
@@ -45,8 +46,10 @@ class SacNode:
         "_hardware",
         "_memory",
         "_messages",
+        "_movement",
         "_network",
         "_now",
+        "_onlookers",
         "_pins",
         "_rate",
         "_settings",
@@ -77,6 +80,9 @@ class SacNode:
         #: Frequency of the clock at the xclk pin.
         self.xclk_hz = settings.xclk_hz
         self._pins: SacPins | None = None
+        self._movement: SacMovement | None = None
+        #: Those of both that there are: they look whether anything has changed.
+        self._onlookers: tuple[SacPins | SacMovement, ...] = ()
         #: Called each time the contents of the EEPROM have changed.
         self.memory_changed: Callable[[], None] | None = None
         #: What the EEPROM holds; what the node obeys is what it held at the last boot.
@@ -135,8 +141,8 @@ class SacNode:
             self._network.hear(heard)
         else:
             self.terminal_keys(self._exchanged.keys(heard), now)
-        if self._pins is not None:
-            self._pins.look(now)
+        if self._onlookers:
+            self.look(now)
 
     def wake_at(self) -> Ns | None:
         """The next answer or packet to send, the end of the command that runs, or of a boot."""
@@ -158,8 +164,8 @@ class SacNode:
         if self._start is not None:
             self._end_boot(self._start, now)
         self._commands.wake(now)
-        if self._pins is not None:
-            self._pins.look(now)
+        if self._onlookers:
+            self.look(now)
         data = self._network.wake(now)
         if self._exchanged is None:
             return data
@@ -170,7 +176,7 @@ class SacNode:
     def state(self, now: Ns) -> str:
         """What the engine does; SYNC while a command is held that has not begun; OFF; BOOT."""
         if self._start is not None:
-            return "OFF" if self._start is OFF else BOOT
+            return self.off_or_booting
         return "SYNC" if self._commands.held is not None else self._engine.state(now).name
 
     def snapshot(self, now: Ns) -> Snapshot:
@@ -241,8 +247,8 @@ class SacNode:
             self._commands.execute(Stop(grace=False), now)
             self._network.listen_from(None)
             self._start = OFF
-        if self._pins is not None:
-            self._pins.look(now)
+        if self._onlookers:
+            self.look(now)
 
     def reboot(self, now: Ns) -> None:
         """The warm boot of ``$R``: parameters anew from EEPROM; queue and motor stay.
@@ -328,6 +334,13 @@ class SacNode:
         """Whether it runs: switched on, and its boot is over."""
         return self._start is None
 
+    @property
+    def off_or_booting(self) -> str:
+        """OFF or BOOT; empty while it runs."""
+        if self._start is None:
+            return ""
+        return "OFF" if self._start is OFF else BOOT
+
     # ---- the ports ----
 
     def _set_up_ports(self) -> None:
@@ -363,16 +376,16 @@ class SacNode:
             return
         self._now = now
         self._exchanged.hear(keys, now)
-        if self._pins is not None:
-            self._pins.look(now)
+        if self._onlookers:
+            self.look(now)
 
     def terminal_keys(self, keys: bytes, now: Ns) -> None:
         """Keys arrive at the terminal, on whichever port; a boot under way takes them all."""
         self._now = now
         if keys and (self._start is None or not self._start.key()):
             self._terminal_port().take(keys, now)
-        if self._pins is not None:
-            self._pins.look(now)
+        if self._onlookers:
+            self.look(now)
 
     def show(self, text: bytes) -> None:
         """What the terminal prints."""
@@ -418,7 +431,21 @@ class SacNode:
         """Its pins, made when they are first asked for: most nodes have nothing wired to them."""
         if self._pins is None:
             self._pins = SacPins(self)
+            self._onlookers = (*self._onlookers, self._pins)
         return self._pins
+
+    @property
+    def movement(self) -> SacMovement:
+        """Its motion as it tells of it, made when it is first asked for."""
+        if self._movement is None:
+            self._movement = SacMovement(self)
+            self._onlookers = (*self._onlookers, self._movement)
+        return self._movement
+
+    def look(self, now: Ns) -> None:
+        """Something has been done at ``now``: let those see it who tell of it."""
+        for onlooker in self._onlookers:
+            onlooker.look(now)
 
     def send_soft_ops(self, *, on: bool) -> None:
         """Tell the network of the starts and ends of commands, or no longer."""
@@ -442,6 +469,8 @@ class SacNode:
         clock = self._external_clock()
         if clock is not None:
             self._commands.set_clock(clock, now)
+        if self._onlookers:
+            self.look(now)
 
     def _external_clock(self) -> Timebase | None:
         """What times pulses instead of the oscillator; None when nothing does."""

@@ -74,6 +74,10 @@ class Wired(Protocol):
         """Have a clock of that frequency there."""
         ...
 
+    def look(self, now: Ns) -> None:
+        """Something has been done at ``now``: let those see it who tell of it."""
+        ...
+
     def watch_ops(self) -> None:
         """See anew whether anybody is to be told of starts and ends of commands."""
         ...
@@ -128,7 +132,7 @@ class SacPins:
                 node.feed_xclk(level, now)
             case _:
                 self._turn(pin, level, now)
-        self.look(now)
+        node.look(now)
 
     def _turn(self, pin: str, level: int, now: Ns) -> None:
         """The encoder: throttle in continuous motion, or follow: one pulse a detent."""

@@ -23,17 +23,17 @@ class HarmonicLaw:
     way down. A law on the way down ends where its speed would reach 0.
     """
 
-    __slots__ = ("_rate", "_start", "falling", "slope")
+    __slots__ = ("falling", "rate", "slope", "start")
 
     def __init__(self, rate: int, start: int, slope: int) -> None:
-        self._rate: Final = rate
-        self._start: Final = start
+        self.rate: Final = rate
+        self.start: Final = start
         self.slope: Final = slope
         self.falling: Final = slope > 0
 
     def periods(self, count: int) -> Iterable[int]:
         """The first `count` nominal periods; fewer when the law ends before."""
-        rate, start, slope = self._rate, self._start, self.slope
+        rate, start, slope = self.rate, self.start, self.slope
         if slope < 0:
             count = min(count, (start - 1) // -slope + 1)
         return [rate // speed for speed in range(start, start + slope * count, slope)]
@@ -46,14 +46,14 @@ class HarmonicLaw:
         """
         if self.falling:
             limit = np.maximum(periods + 1, 1)
-            first = -((self._start - 1 - self._rate // limit) // self.slope)
+            first = -((self.start - 1 - self.rate // limit) // self.slope)
             return np.where(periods >= 0, first, FAR)
-        first = -((self._rate // np.maximum(periods, 1) - self._start) // -self.slope)
+        first = -((self.rate // np.maximum(periods, 1) - self.start) // -self.slope)
         return np.where(periods > 0, first, 0)
 
     def speed(self, index: int, nominal: int) -> int:  # noqa: ARG002  the law knows it exactly
         """Speed of the pulse at `index`, exactly."""
-        return self._start + self.slope * index
+        return self.start + self.slope * index
 
 
 @lru_cache(maxsize=RAMPS_KEPT)

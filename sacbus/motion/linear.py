@@ -45,13 +45,14 @@ class LinearLaw:
     pulses_per_rev: sprf x 2**ustep. acc100: rad/s2 x 100, > 0. rate as in drive.py.
     """
 
-    __slots__ = ("_first", "_rate", "_reached", "acc100", "falling")
+    __slots__ = ("_first", "_reached", "acc100", "falling", "pulses_per_rev", "rate")
 
     def __init__(self, pulses_per_rev: int, acc100: int, rate: int) -> None:
         alpha = 2 * pi / pulses_per_rev
         ticks_per_second = TICKS_PER_MINUTE // 60
         self._first = FIRST_STEP * sqrt(2 * alpha / (acc100 / 100)) * ticks_per_second
-        self._rate: Final = rate
+        self.rate: Final = rate
+        self.pulses_per_rev: Final = pulses_per_rev
         self.acc100: Final = acc100
         self._reached = (0, self._first)
         self.falling: Final = True
@@ -86,7 +87,7 @@ class LinearLaw:
 
     def speed(self, index: int, nominal: int) -> int:  # noqa: ARG002  only the period tells
         """Speed of the pulse, from its nominal period."""
-        return self._rate // nominal
+        return self.rate // nominal
 
     def _walk(self, n: int) -> float:
         """c[n] by the recurrence, going on from where the last walk ended if it can."""

@@ -63,6 +63,25 @@ class Profile:
         duration = None if shares.cruise is None else course.began[-1]
         return cls(motion, drive, start_rpm, shares, duration, kept_rpm, course)
 
+    @classmethod
+    def of_legs(
+        cls, motion: Motion, drive: Drive, legs: list[Leg], duration: int | None
+    ) -> "Profile":
+        """A profile of known legs, as :mod:`sacbus.motion.stored` reads one back.
+
+        It answers what is asked about its pulses; what is kept for the next command is not known.
+        """
+        course = Course(legs)
+        acc, dec = course.pulses_in(State.ACCEL), course.pulses_in(State.DECEL)
+        cruise = None if course.pulses is None else course.pulses_in(State.CRUISE)
+        shares = Shares(acc, cruise, dec, 0, 1, accelerates=acc > 0, truncated=False)
+        return cls(motion, drive, 0, shares, duration, 0, course)
+
+    @property
+    def is_laid_out(self) -> bool:
+        """Whether its legs are there: of one that was cut into, or asked about its pulses."""
+        return self._course is not None
+
     @property
     def course(self) -> Course:
         """The legs, laid out when first asked for."""

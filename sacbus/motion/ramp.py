@@ -98,12 +98,12 @@ class Ramp:
     the planner, which must be quick, asks `time`.
     """
 
-    __slots__ = ("_mark_index", "_mark_time", "_offset", "_tail_nominal", "law", "sums")
+    __slots__ = ("_mark_index", "_mark_time", "_tail_nominal", "law", "offset", "sums")
 
     def __init__(self, law: Law, offset: int) -> None:
         """`offset` ticks are added to every nominal period; a real one is at least 1."""
         self.law: Final = law
-        self._offset: Final = offset
+        self.offset: Final = offset
         self.sums = array("q", (0,))
         self._mark_index: list[int] = []
         self._mark_time: list[int] = []
@@ -125,7 +125,7 @@ class Ramp:
 
     def speed(self, index: int) -> int:
         """Speed (see drive.py) of the pulse at `index`."""
-        return self.law.speed(index, max(1, self.period(index) - self._offset))
+        return self.law.speed(index, max(1, self.period(index) - self.offset))
 
     def index(self, ticks: int, limit: int) -> int:
         """The pulse whose period runs at `ticks`: the last whose time is not later.
@@ -161,7 +161,7 @@ class Ramp:
         count = FIRST_GROWTH
         while count < index:
             count *= 2
-        offset = self._offset
+        offset = self.offset
         real = (max(1, p + offset) for p in self.law.periods(min(count, HEAD)))
         # A new array instead of an append: readers may hold numpy views of the old one.
         self.sums = array("q", accumulate(real, initial=0))
@@ -192,7 +192,7 @@ class Ramp:
         begin = self._tail_nominal + slope * number * PAGE
         nominal = begin + slope * np.arange(PAGE + 1, dtype=np.int64)
         starts = np.maximum(law.onsets(nominal), self._mark_index[number])
-        periods = np.maximum(nominal[:-1] + self._offset, 1)
+        periods = np.maximum(nominal[:-1] + self.offset, 1)
         times = np.empty(PAGE + 1, dtype=np.int64)
         times[0] = self._mark_time[number]
         np.cumsum(np.diff(starts) * periods, out=times[1:])

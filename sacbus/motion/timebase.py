@@ -10,7 +10,10 @@ from functools import lru_cache
 from math import gcd
 from typing import Final, Self
 
+import numpy as np
+
 from sacbus.motion.drive import TICKS_PER_US
+from sacbus.motion.ramp import Ticks64
 
 FACTORY_XFREQ: Final = 1_000_000
 """Hz. All timing is in microseconds, so an external clock is taken to be of 1 MHz (manual)."""
@@ -18,6 +21,9 @@ FACTORY_XFREQ: Final = 1_000_000
 MILLION: Final = 1_000_000
 
 NS_PER_TICK: Final = 1_000 // TICKS_PER_US
+
+_FITS: Final = 1 << 62
+"""Products up to here fit int64."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +65,16 @@ class Timebase:
     def span(self, ticks: int) -> int:
         """Nanoseconds after which a tick begins; ZeroDivisionError when the clock stands still."""
         return -(-ticks * self.ns // self.ticks)
+
+    def spans(self, ticks: Ticks64) -> Ticks64:
+        """:meth:`span` of many at once; the results must fit int64, which are 292 years."""
+        if self.ticks == 1:
+            return ticks * self.ns
+        if self.ns * self.ticks >= _FITS:
+            return np.array([self.span(int(one)) for one in ticks], dtype=np.int64)
+        whole, rest = np.divmod(ticks, self.ticks)
+        begun: Ticks64 = whole * self.ns - -rest * self.ns // self.ticks
+        return begun
 
     def ticks_in(self, ns: int) -> int:
         """Ticks that begin within some ns; none when the clock stands still."""
