@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Sequence
-from typing import IO, TYPE_CHECKING, Final, Self
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
 
 import click
 
@@ -53,6 +55,9 @@ def _read_parameters(
 @click.option("-k", "word", metavar="WORD", help="Only those with WORD in file, title or case.")
 @click.option("-x", "first", is_flag=True, help="Stop after the first that fails.")
 @click.option(
+    "--record", type=click.Path(dir_okay=False), metavar="FILE", help="Keep a recording of it."
+)
+@click.option(
     "--junit",
     type=click.File("w", encoding="utf-8", lazy=True),
     metavar="FILE",
@@ -69,6 +74,7 @@ def run_command(
     speed: float | None,
     word: str | None,
     first: bool,
+    record: str | None,
     junit: IO[str] | None,
     as_json: bool,
 ) -> int:
@@ -85,15 +91,23 @@ def run_command(
 
     if real and link is not None:
         raise click.UsageError("expected --real or --link, got both")
+    if record is not None and link is not None:
+        raise click.UsageError(
+            "--record: expected a bus in this process, got --link, see sacbus monitor"
+        )
     if speed is not None and not real:
         raise click.UsageError("--speed: expected only with --real")
     chosen = _read(files, parameters, seed, word, line_only=link is not None)
     if not chosen:
         raise click.UsageError(f"-k: no file, title or case has {word!r} in it")
+    if record is not None and len(chosen) > 1:
+        raise click.UsageError(
+            f"--record: expected one scenario of one case, got {len(chosen)}, use -k or --set"
+        )
     results: list[Result] = []
     for scenario in chosen:
-        with _Progress(scenario) as progress:
-            result = _played(scenario, real, link, speed, progress.come_to)
+        with _Progress(scenario) as progress, _opened(record) as file:
+            result = _played(scenario, real, link, speed, file, progress.come_to)
         results.append(result)
         if not as_json:
             _tell(result)
@@ -142,6 +156,7 @@ def _played(
     real: bool,
     link: str | None,
     speed: float | None,
+    record: BinaryIO | None,
     progress: Callable[[int], None] | None,
 ) -> Result:
     from sacbus.scenario import run, run_on_link, run_real
@@ -149,8 +164,18 @@ def _played(
     if link is not None:
         return run_on_link(scenario, link, progress=progress)
     if real:
-        return run_real(scenario, speed=speed or 1.0, progress=progress)
-    return run(scenario, progress=progress)
+        return run_real(scenario, speed=speed or 1.0, record=record, progress=progress)
+    return run(scenario, record=record, progress=progress)
+
+
+@contextmanager
+def _opened(path: str | None) -> Iterator[BinaryIO | None]:
+    """The file of a recording, for writing it and for reading it back."""
+    if path is None:
+        yield None
+        return
+    with Path(path).open("w+b") as file:
+        yield file
 
 
 def _tell(result: Result) -> None:

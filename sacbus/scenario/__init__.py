@@ -11,12 +11,16 @@ from sacbus.scenario.expectations import (
     PacketSeen,
     Shown,
     Silent,
+    Straight,
+    Together,
 )
 from sacbus.scenario.quantity import Bounds, bounds, nanoseconds
 from sacbus.scenario.reading import read
 from sacbus.scenario.result import Failure, Result
 from sacbus.scenario.run import run, run_on_link, run_real
 from sacbus.scenario.values import (
+    Disturb,
+    Lift,
     Mark,
     Pause,
     Pin,
@@ -33,8 +37,10 @@ from sacbus.scenario.values import (
 __all__ = [
     "Bounds",
     "Counted",
+    "Disturb",
     "Expectation",
     "Failure",
+    "Lift",
     "Mark",
     "NodeIs",
     "PacketSeen",
@@ -49,6 +55,8 @@ __all__ = [
     "Shown",
     "Silent",
     "Step",
+    "Straight",
+    "Together",
     "Turn",
     "Type",
     "bounds",

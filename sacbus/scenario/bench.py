@@ -19,6 +19,7 @@ from sacbus.mother import Caller, Clock
 from sacbus.node import Heard, Node, Protocol, Report, ReportKind
 from sacbus.panel import Panel
 from sacbus.scenario.line import Line, Passed
+from sacbus.scenario.tape import Tape
 
 __all__ = ["Bench", "far_bench", "hosted_bench", "piped_bench"]
 
@@ -56,6 +57,8 @@ class Bench:
         self.shown: dict[int, bytearray] = {}
         self.warnings: Counter[int | None] = Counter()
         self.origin: Ns = 0
+        #: What is recorded of it; None where nothing is.
+        self.tape: Tape | None = None
         self._collided_before = 0
 
     def begin(self, origin: Ns) -> None:
@@ -169,8 +172,10 @@ def _watch(bench: Bench, hosted: HostedBus) -> None:
     def over(sent: Transmission) -> None:
         sender = sent.sender
         who = named.get(id(sender)) or str(getattr(sender, "name", "line"))
-        data = sent.data if sent.hits is None else sent.arrived(0, len(sent.data), seed)
-        line.note(Passed(sent.start, sent.end, sent.lane, who, data, sent.collided))
+        data = sent.data
+        if sent.hits is not None or sent.passage is not None:
+            data = sent.outcome(seed)
+        line.note(Passed(sent.start, sent.end, sent.lane, who, data, sent.collided, sent.faults))
 
     def report(told: Report) -> None:
         if told.kind is ReportKind.WARNING:

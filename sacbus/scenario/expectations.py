@@ -22,6 +22,8 @@ __all__ = [
     "PacketSeen",
     "Shown",
     "Silent",
+    "Straight",
+    "Together",
     "count_words",
 ]
 
@@ -141,7 +143,34 @@ class Shown:
         return f"terminal of node {self.node} shows {self.text!r}{_when(self.within)}"
 
 
-Expectation = NodeIs | PacketSeen | Silent | Counted | Shown
+@dataclass(frozen=True, slots=True)
+class Together:
+    """The last motions of ``nodes`` started within ``most`` ns of each other, by first pulses."""
+
+    nodes: tuple[int, ...]
+    most: Ns
+    bus: str = ""
+
+    def __str__(self) -> str:
+        return f"{_nodes(self.nodes)}: start skew at most {time_text(self.most)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """In their last motion ``nodes``, as axes, kept within ``most`` full steps of a straight line.
+
+    The line is that from where they stood before its first pulse to where they stand now.
+    """
+
+    nodes: tuple[int, ...]
+    most: float
+    bus: str = ""
+
+    def __str__(self) -> str:
+        return f"{_nodes(self.nodes)}: deviation at most {self.most:g} steps"
+
+
+Expectation = NodeIs | PacketSeen | Silent | Counted | Shown | Together | Straight
 
 
 def count_words(counts: Mapping[str, int]) -> str:

@@ -27,10 +27,13 @@ from sacbus.scenario.expectations import (
     PacketSeen,
     Shown,
     Silent,
+    Straight,
+    Together,
     count_words,
 )
 from sacbus.scenario.line import Passed
-from sacbus.scenario.quantity import Bounds
+from sacbus.scenario.motion import deviation, start_skew
+from sacbus.scenario.quantity import Bounds, time_text
 
 __all__ = ["Judge", "judge"]
 
@@ -54,6 +57,8 @@ def judge(expected: Expectation, bench: Bench, verdict: Verdict) -> Judge:
             return _Looks(bench, verdict, expected, _CountLook(bench, expected))
         case Shown():
             return _Looks(bench, verdict, expected, _ShownLook(bench, expected))
+        case Together() | Straight():
+            return _MotionJudge(bench, verdict, expected)
         case PacketSeen():
             return _PacketJudge(bench, verdict, expected)
         case Silent():
@@ -183,6 +188,41 @@ class _ShownLook:
 
     def next_at(self) -> Ns | None:
         return None
+
+
+class _MotionJudge:
+    """Asks the recording once, now."""
+
+    def __init__(self, bench: Bench, verdict: Verdict, expected: Together | Straight) -> None:
+        self._bench = bench
+        self._verdict = verdict
+        self._expected = expected
+
+    def begin(self) -> None:
+        bench, expected = self._bench, self._expected
+        assert bench.tape is not None, "a bus is recorded whose motion is looked at"
+        found = bench.tape.tracks(bench.name)
+        tracks = {node: found[node] for node in expected.nodes}
+        now = bench.clock.now
+        match expected:
+            case Together(most=most):
+                self._verdict(self._together(start_skew(tracks, now), most))
+            case Straight(most=farthest):
+                away = deviation(tracks, now)
+                if away is None:
+                    self._verdict("no motion")
+                else:
+                    self._verdict(None if away <= farthest else f"{away:.3f} steps")
+
+    def _together(self, found: tuple[Ns, dict[int, Ns]] | None, most: Ns) -> str | None:
+        if found is None:
+            return "one that has not moved"
+        skew, starts = found
+        if skew <= most:
+            return None
+        first = min(starts.values())
+        later = ", ".join(f"{node} +{time_text(at - first)}" for node, at in starts.items())
+        return f"{time_text(skew)} ({later})"
 
 
 class _PacketJudge:

@@ -20,6 +20,7 @@ __all__ = [
     "EXPECTED",
     "PIN",
     "POWER",
+    "QUEUE",
     "SEND",
     "STEP",
     "TOP",
@@ -195,6 +196,9 @@ DEEDS: Final = (
     Key("pin", "a table", _is_table, "inputs of nodes driven to levels"),
     Key("turn", "a table", _is_table, "the encoder turned"),
     Key("power", "a table", _is_table, "nodes switched off or on"),
+    Key("fault", "a table of one fault", _is_table, "a fault of the line put on"),
+    Key("lift", "the name of a step with a fault", _is_name, "that fault taken off"),
+    Key("queue", "a table", _is_table, "a queue file sent to nodes as edits, with retries"),
     Key("mark", "a text", _is_name, "a remark in the recording"),
     Key("expect", "a table", _is_table, "what must come"),
     Key("step", "[[step.step]]", _is_tables, "several steps, one after the other"),
@@ -241,6 +245,17 @@ TYPE: Final = (
 
 PIN: Final = (_NODE,)
 
+QUEUE: Final = (
+    Key(
+        "node",
+        f"{_NODES}, or 0 for a broadcast",
+        lambda value: _is_nodes(value) or _whole(0, 0)(value),
+        "whose",
+        required=True,
+    ),
+    Key("file", "a path", _is_name, "of the companion's CSV", required=True),
+)
+
 TURN: Final = (
     _NODE,
     Key(
@@ -266,6 +281,8 @@ EXPECTED: Final = {
     "answer": "packet",
     "soft_op": "packet",
     "silence": "silence",
+    "start_skew": "start_skew",
+    "deviation": "deviation",
     "retries": "count",
     "naks": "count",
     "acks": "count",
@@ -324,6 +341,13 @@ EXPECT: Final = (
         default=1,
     ),
     Key("silence", TIME, _is_time, "nothing on the line, or from that node, for so long"),
+    Key("start_skew", TIME, _is_time, "by which their last motions started apart at most"),
+    Key(
+        "deviation",
+        "a number of full steps from 0 on",
+        lambda value: _is_bounds(value) and isinstance(value, int | float) and value >= 0,
+        "by which the nodes, as axes, left the straight line of their last motion at most",
+    ),
     Key("retries", _BOUNDS, _is_bounds, "lines that mother sent again"),
     Key("naks", _BOUNDS, _is_bounds, "NAKs that mother got"),
     Key("acks", _BOUNDS, _is_bounds, "ACKs that mother got"),

@@ -33,6 +33,8 @@ class Passed:
     sender: int | str
     data: bytes
     collided: bool = False
+    #: The faults that acted on it.
+    faults: tuple[str, ...] = ()
 
 
 class Line:
@@ -57,8 +59,8 @@ class Line:
         protocol = self.protocol
         events = protocol.decoder().receive(passed.data)
         said = "; ".join(_said(protocol.tell(event)) for event in events)
-        hit = ", collided" if passed.collided else ""
-        raw = "" if said else passed.data[:24].hex(" ")
+        hit = "".join(f", {one}" for one in (*passed.faults, *["collided"][: passed.collided]))
+        raw = passed.data[:24].hex(" ") or "nothing"
         when = f"{(passed.start - origin) / SECOND:.6f} s"
         return f"{when}  {passed.sender}: {said or raw}{hit}"
 

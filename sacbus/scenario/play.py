@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Final
 
+from sacbus.bus import FaultOn
 from sacbus.kernel import Ns
 from sacbus.mother import (
     Acknowledged,
@@ -28,6 +29,8 @@ from sacbus.scenario.expectations import Shown
 from sacbus.scenario.judges import judge
 from sacbus.scenario.result import Failure, Result
 from sacbus.scenario.values import (
+    Disturb,
+    Lift,
     Mark,
     Outcome,
     Pause,
@@ -84,6 +87,8 @@ class Play:
         self._clock = self._first.clock
         self._origin: Ns = 0
         self._followers: defaultdict[int, list[int]] = defaultdict(list)
+        #: The faults that are on, by the names of the steps that put them on.
+        self._faults: defaultdict[str, list[FaultOn]] = defaultdict(list)
         self._open = set(range(len(scenario.steps)))
         #: Polls that go on to the end.
         self._background: set[int] = set()
@@ -140,7 +145,20 @@ class Play:
                 bench = self._bench(bus)
                 bench.talk(data)
                 self._clock.at(self._clock.now + bench.span(len(data)), self._sent, index, bench)
-            case Pause() | Mark():
+            case Disturb(fault, bus):
+                hosted = self._bench(bus).hosted
+                assert hosted is not None, "the rules have looked"
+                self._faults[step.name].append(hosted.fault(fault))
+                self._settle(index)
+            case Lift(name):
+                for on in self._faults.pop(name, ()):
+                    on.off()
+                self._settle(index)
+            case Mark(text):
+                if self._first.tape is not None:
+                    self._first.tape.recorder.mark(text)
+                self._settle(index)
+            case Pause():
                 self._settle(index)
             case Type() | Pin() | Turn() | Power() as deed:
                 self._handle(deed)
@@ -237,6 +255,7 @@ class Play:
             if self.over:
                 return
             got = _outcome(outcome)
+            self._record(bench, line, outcome, got)
             if send.outcome not in ("any", got):
                 self._settle(index, f"{line!r} to end in {send.outcome}", _told(outcome))
             elif number + 1 < len(send.lines):
@@ -245,6 +264,20 @@ class Play:
                 self._settle(index)
 
         _ask(bench, line, done, accept_duplicates=send.accept_duplicates)
+
+    def _record(
+        self, bench: Bench, line: str, outcome: Acknowledged | Sent | MotherError, told: str
+    ) -> None:
+        if bench.tape is None:
+            return
+        node, command = addressed_line(line)
+        bench.tape.recorder.outcome(
+            node,
+            command.encode("latin-1"),
+            "sent" if isinstance(outcome, Sent) else told,
+            getattr(outcome, "attempts", 1),
+            bus=bench.tape.number(bench.name),
+        )
 
     def _begin_poll(self, index: int, poll: Poll) -> None:
         polling = _Polling(self._bench(poll.bus), poll, partial(self._poll_failed, index))
@@ -353,7 +386,7 @@ def _called(deed: object) -> str:
     match deed:
         case Send(lines=lines) | Poll(lines=lines):
             return f"{lines[0]!r}"
-        case Raw() | Type() | Pin() | Turn() | Power() | Pause() | Mark():
+        case Raw() | Type() | Pin() | Turn() | Power() | Disturb() | Lift() | Pause() | Mark():
             return f"the {type(deed).__name__.lower()}"
         case _:
             return str(deed)

@@ -53,13 +53,14 @@ def nanoseconds(value: object) -> Ns:
 
 
 def time_text(ns: Ns) -> str:
-    """A time in the largest unit in which it is a short number: ``250 ms``, ``1.5 s``."""
+    """A time in the largest unit that fits into it, exactly: ``250 ms``, ``1.5 s``, ``0 s``."""
     for unit, size in (("s", SECOND), ("ms", MS), ("us", US)):
-        if ns % (size // 1_000 if size > US else size) == 0 and ns >= size:
+        if ns >= size:
             whole, rest = divmod(ns, size)
-            digits = f"{rest / size:.3f}"[1:].rstrip("0").rstrip(".") if rest else ""
-            return f"{whole}{digits} {unit}"
-    return "0 s" if ns == 0 else f"{ns} ns"
+            # The digits of the rest, with the zeros before them that the 1 of ``size`` holds up.
+            digits = f"{size + rest}"[1:].rstrip("0")
+            return f"{whole}.{digits} {unit}" if digits else f"{whole} {unit}"
+    return f"{ns} ns" if ns else "0 s"
 
 
 @dataclass(frozen=True, slots=True)

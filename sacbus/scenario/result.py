@@ -11,6 +11,7 @@ from typing import Any
 
 from sacbus.kernel import SECOND, US, Ns
 from sacbus.scenario.values import Scenario
+from sacbus.trace import Recording
 
 __all__ = ["Failure", "Result", "case_words"]
 
@@ -59,6 +60,8 @@ class Result:
     ended: Ns = 0
     expectations: int = 0
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    #: What was recorded; None where nothing was.
+    recording: Recording | None = None
 
     @property
     def passed(self) -> bool:

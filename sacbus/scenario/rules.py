@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 
+from sacbus.bus import Fault
 from sacbus.config.mistake import ConfigError, Mistake
 from sacbus.config.notation import ranges
 from sacbus.configuration import Configuration, check
@@ -19,11 +20,21 @@ from sacbus.kernel import LineRate
 from sacbus.mother import BadRequest, addressed_line, safe_body
 from sacbus.mother.request import checked_address
 from sacbus.node import Node, PinError, find_kind, settings_from
-from sacbus.scenario.expectations import Counted, NodeIs, PacketSeen, Shown, Silent
+from sacbus.scenario.expectations import (
+    Counted,
+    NodeIs,
+    PacketSeen,
+    Shown,
+    Silent,
+    Straight,
+    Together,
+)
 from sacbus.scenario.play import predecessor
 from sacbus.scenario.quantity import time_text
 from sacbus.scenario.values import (
     Deed,
+    Disturb,
+    Lift,
     Mark,
     Pause,
     Pin,
@@ -108,6 +119,10 @@ def _beyond_a_line(deed: Deed | str | None) -> str | None:
             return "an encoder"
         case Power():
             return "a power switch"
+        case Disturb():
+            return "faults of the line"
+        case Together() | Straight():
+            return "the motion of nodes"
         case NodeIs(position=position, velocity=velocity, state=state):
             names = {"position": position, "velocity": velocity, "state": state}
             asked = [name for name, value in names.items() if value is not None]
@@ -209,8 +224,25 @@ class _Rules:
                 yield from self._has_pins(bus, nodes, pins, key or "expect")
             case Counted(nodes=nodes):
                 yield from self._nodes(bus, nodes or (), key or "expect")
+            case Together(nodes=nodes) | Straight(nodes=nodes):
+                yield from self._nodes(bus, nodes, key or "expect")
+                if len(nodes) < 2:
+                    yield key or "expect", "expected two nodes at least, got one", "name them"
+            case Disturb(fault=fault):
+                yield from self._nodes(bus, _nodes_of(fault), "fault")
+            case Lift(step=name):
+                yield from self._fault_steps(name)
             case Pause() | Mark() | Silent():
                 pass
+
+    def _fault_steps(self, name: str) -> Iterator[_Found]:
+        known = sorted(
+            {one.name for one in self._scenario.steps if isinstance(one.does, Disturb) and one.name}
+        )
+        if name not in known:
+            words = f"known are {', '.join(known)}" if known else "no step with a fault has one"
+            what = f"expected the name of a step with a fault, got {name!r}"
+            yield "lift", what, f"correct it; {words}"
 
     def _line(self, bus: Configuration, line: str, outcome: str) -> Iterator[_Found]:
         try:
@@ -284,6 +316,15 @@ class _Rules:
                 settings = settings_from(kind.settings, at.settings)
                 self._aside[made] = kind.create(at.address, settings, LineRate(), _ignore)
             yield at.address, self._aside[made]
+
+
+def _nodes_of(fault: Fault) -> tuple[int, ...]:
+    """The addresses that a fault names, where it has some."""
+    found: set[int] = set()
+    for name in ("node", "beyond"):
+        value = getattr(fault, name, None)
+        found |= {value} if isinstance(value, int) else set(value or ())
+    return tuple(sorted(found))
 
 
 def _ignore(_report: object) -> None:

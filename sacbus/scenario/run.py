@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import dataclasses
-from collections.abc import Callable
-from contextlib import AsyncExitStack, suppress
-from typing import Final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AsyncExitStack, contextmanager, suppress
+from io import BytesIO
+from typing import BinaryIO, Final
 
 from sacbus.configuration import Configuration, check
 from sacbus.daemon import open_bus
@@ -20,9 +21,11 @@ from sacbus.kernel import SECOND, Kernel, LineRate, Ns
 from sacbus.links import PtyLink, open_line
 from sacbus.mother.mother import LINK_SLACK, LoopClock
 from sacbus.scenario.bench import Bench, far_bench, hosted_bench, piped_bench
+from sacbus.scenario.expectations import Straight, Together
 from sacbus.scenario.play import Play
 from sacbus.scenario.result import Result
 from sacbus.scenario.rules import refuse
+from sacbus.scenario.tape import Tape
 from sacbus.scenario.values import Scenario
 
 __all__ = ["run", "run_on_link", "run_real"]
@@ -34,20 +37,28 @@ SLICE: Final[Ns] = SECOND
 Progress = Callable[[Ns], None]
 
 
-def run(scenario: Scenario, *, progress: Progress | None = None) -> Result:
+def run(
+    scenario: Scenario, *, record: BinaryIO | None = None, progress: Progress | None = None
+) -> Result:
     """Play a scenario in virtual time; ConfigError for one that cannot be played.
 
+    ``record``: an empty file, open for reading and writing, that the recording goes to; it must
+    stay open for as long as that is read. Without one, what expectations need is kept in memory.
     ``progress`` is called every :data:`SLICE` of bus time.
     """
     refuse(scenario)
     kernel = Kernel()
-    return run_virtual(kernel, _virtually(scenario, kernel, progress))
+    return run_virtual(kernel, _virtually(scenario, kernel, record, progress))
 
 
-async def _virtually(scenario: Scenario, kernel: Kernel, progress: Progress | None) -> Result:
+async def _virtually(
+    scenario: Scenario, kernel: Kernel, record: BinaryIO | None, progress: Progress | None
+) -> Result:
     async with AsyncExitStack() as stack:
         hosted = await _host(stack, [_alone(bus) for bus in scenario.buses])
-        play = Play(scenario, {one.configuration.name: hosted_bench(one) for one in hosted})
+        benches = {one.configuration.name: hosted_bench(one) for one in hosted}
+        play = Play(scenario, benches)
+        stack.enter_context(_recorded(play, hosted, benches, record))
         play.when_over = _end
         with suppress(_Over):
             play.begin()
@@ -69,13 +80,21 @@ def _end() -> None:
     raise _Over
 
 
-def run_real(scenario: Scenario, *, speed: float = 1.0, progress: Progress | None = None) -> Result:
+def run_real(
+    scenario: Scenario,
+    *,
+    speed: float = 1.0,
+    record: BinaryIO | None = None,
+    progress: Progress | None = None,
+) -> Result:
     """Play a scenario in real time, times ``speed``; mother is a program at a pty of each bus."""
     refuse(scenario)
-    return asyncio.run(_really(scenario, speed, progress))
+    return asyncio.run(_really(scenario, speed, record, progress))
 
 
-async def _really(scenario: Scenario, speed: float, progress: Progress | None) -> Result:
+async def _really(
+    scenario: Scenario, speed: float, record: BinaryIO | None, progress: Progress | None
+) -> Result:
     async with AsyncExitStack() as stack:
         buses = [dataclasses.replace(bus, speed=speed) for bus in scenario.buses]
         hosted = await _host(stack, buses)
@@ -88,6 +107,7 @@ async def _really(scenario: Scenario, speed: float, progress: Progress | None) -
             bench.look = round(bench.look * max(speed, 1.0))
             benches[bus.configuration.name] = bench
         play = Play(scenario, benches)
+        stack.enter_context(_recorded(play, hosted, benches, record))
         over = asyncio.get_running_loop().create_future()
         play.when_over = lambda: over.set_result(None)
         first = hosted[0]
@@ -119,6 +139,29 @@ async def _far(scenario: Scenario, link: str, progress: Progress | None) -> Resu
         play.begin()
         await _until(over, progress, lambda: clock.now)
         return play.result
+
+
+@contextmanager
+def _recorded(
+    play: Play,
+    hosted: Sequence[HostedBus],
+    benches: Mapping[str, Bench],
+    record: BinaryIO | None,
+) -> Iterator[None]:
+    """Record for as long as it is played, if anybody asks for it."""
+    if record is None:
+        steps = play.result.scenario.steps
+        if not any(isinstance(step.does, Together | Straight) for step in steps):
+            yield
+            return
+        record = BytesIO()
+    tape = Tape(hosted, record)
+    for bench in benches.values():
+        bench.tape = tape
+    try:
+        yield
+    finally:
+        play.result.recording = tape.close()
 
 
 async def _until(

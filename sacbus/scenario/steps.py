@@ -6,18 +6,22 @@ out; what steps have to do with each other and with the buses is looked at elsew
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sacbus.bus import FaultError, fault_from
 from sacbus.config import lines
-from sacbus.config.keys import Key
+from sacbus.config.keys import Key, shown
 from sacbus.config.mistake import Findings
 from sacbus.config.notation import addresses
 from sacbus.config.source import Source
 from sacbus.config.table import Table, tables
 from sacbus.configuration import Configuration
 from sacbus.kernel import Ns
+from sacbus.language.queue_file import WrongRow
+from sacbus.scenario.edits import queue_edits
 from sacbus.scenario.expectations import (
     Counted,
     Expectation,
@@ -25,6 +29,8 @@ from sacbus.scenario.expectations import (
     PacketSeen,
     Shown,
     Silent,
+    Straight,
+    Together,
 )
 from sacbus.scenario.keys import (
     DEEDS,
@@ -33,6 +39,7 @@ from sacbus.scenario.keys import (
     MOST_STEPS,
     PIN,
     POWER,
+    QUEUE,
     SEND,
     STEP,
     TURN,
@@ -42,6 +49,8 @@ from sacbus.scenario.parameters import Value, put_in
 from sacbus.scenario.quantity import bounds, nanoseconds
 from sacbus.scenario.values import (
     Deed,
+    Disturb,
+    Lift,
     Mark,
     Pause,
     Pin,
@@ -212,6 +221,12 @@ class StepReader:
                 if not _has(inner, "node", "on"):
                     return None
                 return Power(self._nodes(inner.get("node"), bus), inner.get("on"), bus)
+            case "fault":
+                return self._fault(table, value, bus)
+            case "lift":
+                return Lift(value)
+            case "queue":
+                return self._queue(table, bus)
             case _:
                 return self._pin(table, value, bus)
 
@@ -223,6 +238,35 @@ class StepReader:
                 self._findings.add(table.at("for"), "expected only with every", "remove it")
             return Send(lines_, outcome, table.get("accept_duplicates", False), bus)
         return Poll(lines_, every, _time(table, "for"), outcome, bus)
+
+    def _fault(self, table: Table, value: Mapping[str, object], bus: str) -> Deed | None:
+        try:
+            return Disturb(fault_from(value), bus)
+        except FaultError as wrong:
+            got = "nothing" if wrong.got is None else shown(wrong.got)
+            where = (*table.at("fault"), *(one for one in wrong.key.split(".") if one != "fault"))
+            self._findings.add(where, f"expected {wrong.expected}, got {got}", "correct it")
+            return None
+
+    def _queue(self, table: Table, bus: str) -> Deed | None:
+        inner = self._inner(table, "queue", QUEUE)
+        if not _has(inner, "node", "file"):
+            return None
+        nodes = (0,) if inner.get("node") == 0 else self._nodes(inner.get("node"), bus)
+        file = self._source.directory / os.path.expanduser(inner.get("file"))  # noqa: PTH111
+        try:
+            edits = queue_edits(file, inner.get("file"))
+        except WrongRow as wrong:
+            what = f"expected {wrong.expected}, got {wrong.got}"
+            name = f"{inner.get('file')} line {wrong.line} column {wrong.column}"
+            self._findings.add(inner.at("file"), f"{name}: {what}", "correct it")
+        except (OSError, ValueError) as wrong:
+            why = getattr(wrong, "strerror", None) or wrong
+            what = f"cannot read the queue file {inner.get('file')!r} ({why})"
+            self._findings.add(inner.at("file"), what, "check the path and its permissions")
+        else:
+            return Send(tuple(f"{node}{edit}" for node in nodes for edit in edits), bus=bus)
+        return None
 
     def _pin(self, table: Table, value: Mapping[str, object], bus: str) -> Deed | None:
         inner = self._inner(table, "pin", PIN, whole=False)
@@ -261,7 +305,7 @@ class StepReader:
         if within and lasting:
             self._findings.add(table.at("for"), "expected within or for, got both", "leave one out")
         nodes = self._nodes(table.get("node"), bus) if "node" in table.values else None
-        if sort in ("node", "shown") and nodes is None:
+        if sort in ("node", "shown", "start_skew", "deviation") and nodes is None:
             if table.lacks("node"):
                 self._findings.add(
                     table.path, f"expected node ({EXPECT[0].allowed}), got none", "give one"
@@ -285,6 +329,10 @@ class StepReader:
                 return self._shown(table, nodes, within, bus)
             case "packet":
                 return self._packet(table, within, bus)
+            case "start_skew":
+                return Together(nodes or (), nanoseconds(table.get("start_skew")), bus)
+            case "deviation":
+                return Straight(nodes or (), table.get("deviation"), bus)
             case "silence":
                 return Silent(nanoseconds(table.get("silence")), table.get("from"), bus)
             case _:

@@ -21,12 +21,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from sacbus.bus import Fault
 from sacbus.configuration import Configuration
 from sacbus.kernel import Ns
 from sacbus.scenario.expectations import Expectation
 
 __all__ = [
     "Deed",
+    "Disturb",
+    "Lift",
     "Mark",
     "Outcome",
     "Pause",
@@ -118,6 +121,21 @@ class Power:
 
 
 @dataclass(frozen=True, slots=True)
+class Disturb:
+    """A fault of the line put on; it stays until it is lifted, or to the end."""
+
+    fault: Fault
+    bus: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Lift:
+    """The faults taken off that steps of the name ``step`` have put on."""
+
+    step: str
+
+
+@dataclass(frozen=True, slots=True)
 class Pause:
     """Nothing: what a step does that only waits."""
 
@@ -129,7 +147,7 @@ class Mark:
     text: str
 
 
-Deed = Send | Poll | Raw | Type | Pin | Turn | Power | Pause | Mark | Expectation
+Deed = Send | Poll | Raw | Type | Pin | Turn | Power | Disturb | Lift | Pause | Mark | Expectation
 
 
 @dataclass(frozen=True, slots=True)
