@@ -299,7 +299,8 @@ class _SilenceJudge:
 
     def _passed(self, passed: Passed) -> None:
         source = self._expected.source
-        if passed.start < self._until and source in (None, passed.sender):
+        # What faults left nothing of has not been on the line.
+        if passed.data and passed.start < self._until and source in (None, passed.sender):
             self._end(f"{len(passed.data)} bytes of {passed.sender}")
 
     def _end_of_time(self) -> None:

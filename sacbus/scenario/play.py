@@ -14,7 +14,7 @@ from functools import partial
 from typing import Final
 
 from sacbus.bus import FaultOn
-from sacbus.kernel import Ns
+from sacbus.kernel import SECOND, Ns
 from sacbus.mother import (
     Acknowledged,
     MotherError,
@@ -25,7 +25,7 @@ from sacbus.mother import (
     addressed_line,
 )
 from sacbus.scenario.bench import Bench
-from sacbus.scenario.expectations import Shown
+from sacbus.scenario.expectations import Counted, Shown
 from sacbus.scenario.judges import judge
 from sacbus.scenario.result import Failure, Result
 from sacbus.scenario.values import (
@@ -229,9 +229,12 @@ class Play:
         )
 
     def _states(self, bench: Bench, deed: object) -> tuple[str, ...]:
-        """The nodes that a step is about, as they are now."""
+        """The nodes that a step is about, as they are now; the last warnings if it counts them."""
         nodes = getattr(deed, "nodes", None) or ()
         found = []
+        if isinstance(deed, Counted) and "warnings" in deed.counts:
+            for when, text in bench.warned:
+                found.append(f"{(when - self._origin) / SECOND:.6f} s  {text}")
         for address in nodes[:4]:
             if address in bench.panels:
                 seen = bench.panels[address].snapshot()
