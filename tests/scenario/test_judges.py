@@ -25,8 +25,10 @@ def test_a_position_and_a_state_are_waited_for(file: Path) -> None:
 def test_a_position_that_does_not_come_is_told_with_what_there_is(file: Path) -> None:
     text = '[[step]]\nexpect = { node = 10, position = 401, within = "3 s" }\n'
     assert failures(file, MOVES + text) == [
-        "line 6: expected node 10: position 401 within 3 s, got position 400, state STANDBY, "
-        "at 3.005111 s"
+        (
+            "line 6: expected node 10: position 401 within 3 s, got position 400, state STANDBY, "
+            "at 3.005111 s"
+        )
     ]
 
 
@@ -34,8 +36,10 @@ def test_without_a_time_it_must_be_so_at_once(file: Path) -> None:
     assert failures(
         file, '[[step]]\nexpect = { node = "all", state = "CRUISE", velocity = 10 }\n'
     ) == [
-        "line 4: expected nodes 10-11: velocity 10, state CRUISE, got node 10: velocity 0, state "
-        "STANDBY; node 11: velocity 0, state STANDBY, at 0.000000 s"
+        (
+            "line 4: expected nodes 10-11: velocity 10, state CRUISE, got node 10: velocity 0, "
+            "state STANDBY; node 11: velocity 0, state STANDBY, at 0.000000 s"
+        )
     ]
 
 
@@ -247,7 +251,9 @@ def test_axes_that_never_moved_have_no_skew_and_no_path(file: Path) -> None:
         expect = { node = "all", deviation = 1 }
         """
     assert failures(file, text) == [
-        "line 5: expected nodes 10-11: start skew at most 1 ms, got one that has not moved, "
-        "at 0.000000 s",
+        (
+            "line 5: expected nodes 10-11: start skew at most 1 ms, got one that has not moved, "
+            "at 0.000000 s"
+        ),
         "line 7: expected nodes 10-11: deviation at most 1 steps, got no motion, at 0.000000 s",
     ]

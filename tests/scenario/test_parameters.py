@@ -71,5 +71,5 @@ def test_a_value_on_the_command_line_is_as_in_toml_or_else_a_text(text: str, val
 
 @pytest.mark.parametrize("text", ["x", "=1", "1x=1", "x={a = 1}", "x=[]", "x=1979-05-27"])
 def test_what_no_parameter_can_be_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="^expected "):
+    with pytest.raises(ValueError, match=r"^expected "):
         given(text)
