@@ -21,12 +21,12 @@ from sacbus.bus import (
 )
 from sacbus.feed import Sent
 from sacbus.kernel import MS, SECOND, LineRate, Ns
-from sacbus.monitor.entries import Collision, Entry, Lost, Reported, Spoken, Unanswered
-from sacbus.monitor.watch import LINK_SLACK, Watch
 from sacbus.node import Report, ReportKind, Said
+from sacbus.watch.entries import Collision, Entry, Lost, Reported, Spoken, Unanswered
+from sacbus.watch.watch import LINK_SLACK, Watch
 from sacbus.wire import ack, encode, nak
 from tests.bus.strategies import bursts
-from tests.monitor.rig import LINK, M400, Rig, told
+from tests.watch.rig import LINK, M400, Rig, told
 
 RATE = LineRate()
 #: The line's figures: 10 bits a byte at 38 400 baud, and the turnaround of a node (spec, wire).
