@@ -167,6 +167,21 @@ def test_a_scenario_that_takes_more_than_a_line_is_refused_before_the_link_is_op
     )
 
 
+def test_a_capture_is_written_with_or_without_a_recording(file: Path, tmp_path: Path) -> None:
+    alone, beside = tmp_path / "a.pcapng", tmp_path / "b.pcapng"
+    assert run(["run", str(file), "--pcap", str(alone)]) == 0
+    assert run(["run", str(file), "--pcap", str(beside), "--record", str(tmp_path / "r")]) == 0
+    assert alone.read_bytes() == beside.read_bytes()
+    assert b"\x02\x0a\x01m40v300\x03" in alone.read_bytes()
+
+
+def test_a_page_that_cannot_be_written_is_one_line(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file), "--record", str(file.parent / "no" / "r")]) == 1
+    assert capsys.readouterr().err == (
+        f"error: No such file or directory, {file.parent / 'no' / 'r'}\n"
+    )
+
+
 @pytest.mark.slow
 def test_standard_input_is_a_scenario_for_a_real_process() -> None:
     command = [sys.executable, "-m", "sacbus", "run", "-"]
