@@ -186,6 +186,7 @@ class Play:
                     panel.turn(detents)
                 case Power(on=on):
                     panel.power(on=on)
+        bench.stir()
 
     def _settle(
         self, index: int, expected: str = "", got: str | None = None, at: Ns | None = None

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from sacbus.kernel import MS, SECOND
 from tests.scenario.stage import failures, played
 
 MOVES = '[[step]]\nsend = "10m400v120"\n'
@@ -257,3 +258,44 @@ def test_axes_that_never_moved_have_no_skew_and_no_path(file: Path) -> None:
         ),
         "line 7: expected nodes 10-11: deviation at most 1 steps, got no motion, at 0.000000 s",
     ]
+
+
+# ---- looks --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "deed",
+    [
+        'send = "10m400"',
+        'type = { node = 10, keys = "m400\\r" }',
+        'fault = { babble = { pattern = "02 0a 01 6d 31 30 30 03 00 00", every = "1 s" } }',
+    ],
+)
+def test_a_node_that_rests_is_seen_to_move_as_soon_as_it_does(file: Path, deed: str) -> None:
+    text = f"""
+        [[step]]
+        at = "10 s"
+        {deed}
+        [[step]]
+        at = "0 s"
+        expect = {{ node = 10, state = "ACCEL", within = "20 s" }}
+        """
+    result = played(file, text)
+    assert result.passed
+    assert 10 * SECOND < result.ended < 10 * SECOND + 10 * MS
+
+
+def test_a_power_cycle_is_seen_to_its_end(file: Path) -> None:
+    text = """
+        [[step]]
+        at = "10 s"
+        power = { node = 10, on = false }
+        [[step]]
+        power = { node = 10, on = true }
+        [[step]]
+        at = "0 s"
+        expect = { node = 10, state = "BOOT", within = "20 s" }
+        [[step]]
+        expect = { node = 10, state = "STANDBY", within = "2 s" }
+        """
+    assert played(file, text).ended == 11 * SECOND
