@@ -29,7 +29,7 @@ def test_what_is_wrong_with_it_is_said() -> None:
     damaged = encode(10, 1, b"m400").replace(b"4", b"5")
     assert words(damaged).endswith("move 500 full steps, CRC wrong")
     assert words(encode(10, 1, b"m1", crc=False)).endswith("move 1 full step, CRC unchecked")
-    assert words(b"\x55\x55") == "0.001000 s  mother: garbage 55 55"
+    assert words(b"\x55\x55") == "0.001000 s  mother: 55 55"
     assert words(b"", faults=("drop",)) == "0.001000 s  mother: nothing, drop"
     told = words(encode(10, 1, b"S"), collided=True, faults=("delay",))
     assert told.endswith(", delay, collided")
