@@ -114,6 +114,9 @@ class StepReader:
         each: tuple[int | None, ...] = (None,)
         if "each" in loop.values:
             each = self._nodes(loop.get("each"), loop.get("bus", self._bus))
+            if "every" in content and "send" in content:
+                content = self._round(path, content, each, scope)
+                each = (None,)
         found: list[Written] = []
         for number in range(loop.get("repeat", 1)):
             for node in each:
@@ -131,6 +134,25 @@ class StepReader:
                     return found
                 found += self._step(path, content, header, inner)
         return found
+
+    def _round(
+        self,
+        path: lines.Path,
+        content: Mapping[str, object],
+        nodes: Sequence[int | None],
+        scope: Mapping[str, Value],
+    ) -> Mapping[str, object]:
+        """A step that polls each node: one step, whose lines are those of all nodes in turn."""
+        given = content["send"]
+        found: list[object] = []
+        for node in nodes:
+            assert node is not None, "addresses"
+            inner = {**scope, "node": node}
+            found += [
+                put_in(line, inner, (*path, "send"), self._findings, set())
+                for line in (given if isinstance(given, list) else [given])
+            ]
+        return {**content, "send": found}
 
     def _step(
         self,
@@ -199,7 +221,8 @@ class StepReader:
         value = table.get(name)
         match name:
             case "send":
-                return self._send(table, (value,) if isinstance(value, str) else tuple(value), bus)
+                lines_ = value if isinstance(value, list) else [value]
+                return self._send(table, tuple(map(str, lines_)), bus)
             case "raw":
                 return Raw(bytes.fromhex(value), bus)
             case "mark":
