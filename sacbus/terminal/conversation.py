@@ -20,7 +20,7 @@ from typing import Final
 from platformdirs import user_state_path
 
 from sacbus.terminal.background import Background
-from sacbus.terminal.dialog import PROMPT, Untypable
+from sacbus.terminal.dialog import PROMPT, NoAnswer, Untypable
 
 try:
     import readline
@@ -37,10 +37,14 @@ HISTORY_LINES: Final = 1_000
 def converse(link: str, baud: int, *, history: bool) -> None:
     """Talk until the end of input (Ctrl-D). KeyboardInterrupt is passed on.
 
-    ``history``: keep what is typed for the next time. LinkError, ConnectionError, NoAnswer in one
-    line each.
+    ``history``: keep what is typed for the next time. LinkError, ConnectionError, and NoAnswer to
+    the first question, in one line each.
     """
     screen = _Screen()
+    if _HERE:
+        # Nobody wants files completed here, nor an Esc too many to change what all keys mean.
+        for binding in ("tab: self-insert", '"\\M-\\C-j": accept-line', '"\\M-\\C-m": accept-line'):
+            readline.parse_and_bind(binding)
     main = threading.get_ident()
     lost = threading.Event()
 
@@ -60,7 +64,8 @@ def converse(link: str, baud: int, *, history: bool) -> None:
                     line = input(prompt)
                 try:
                     dialog.ask(line)
-                except Untypable as fault:
+                except (Untypable, NoAnswer) as fault:
+                    # The next line may fare better.
                     screen.show(f"{fault}\n{prompt}")
         except EOFError:
             screen.end()

@@ -54,7 +54,8 @@ class NoAnswer(LinkError, TimeoutError):
         super().__init__(
             f"no answer within {PATIENCE:g} s, expected the prompt {PROMPT}",
             where,
-            "check that it is a terminal port and not the network's, and the baud rate",
+            "check that it is a terminal port and not the network's, the baud rate, and that no "
+            "other program reads it",
         )
 
 

@@ -142,7 +142,7 @@ def test_control_c_leaves_with_its_status(tmp_path: Path) -> None:
     with device() as port, person("terminal", port.path, HOME=str(tmp_path)) as who:
         prompted(who, 1)
         who.types(CONTROL_C)
-        assert who.leaves() == 130
+        assert who.leaves(upon=CONTROL_C) == 130
         assert who.errors() == "\ninterrupted\n"
 
 
