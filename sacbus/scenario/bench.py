@@ -6,7 +6,7 @@ the far end of a link, of which only the line can be seen.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Final
 
@@ -25,6 +25,9 @@ __all__ = ["Bench", "far_bench", "hosted_bench", "piped_bench"]
 
 #: How often something is looked at that tells nobody when it changes.
 LOOK: Final[Ns] = 1 * MS
+
+#: Warnings that are kept in words.
+KEPT: Final = 4
 
 
 class Bench:
@@ -56,6 +59,8 @@ class Bench:
         self.panels: dict[int, Panel] = {}
         self.shown: dict[int, bytearray] = {}
         self.warnings: Counter[int | None] = Counter()
+        #: The last of them in words, with the time of each.
+        self.warned: deque[tuple[Ns, str]] = deque(maxlen=KEPT)
         self.origin: Ns = 0
         #: What is recorded of it; None where nothing is.
         self.tape: Tape | None = None
@@ -65,6 +70,7 @@ class Bench:
         """The scenario begins now, which is its time 0."""
         self.origin = origin
         self.warnings.clear()
+        self.warned.clear()
         self._collided_before = self._collided()
 
     def node(self, address: int) -> Node:
@@ -180,6 +186,7 @@ def _watch(bench: Bench, hosted: HostedBus) -> None:
     def report(told: Report) -> None:
         if told.kind is ReportKind.WARNING:
             bench.warnings[told.address] += 1
+            bench.warned.append((told.when, str(told)))
 
     bus.medium.watchers.append(over)
     bus.report_watchers.append(report)

@@ -31,7 +31,7 @@ __all__ = [
 COUNTS: Final = ("retries", "naks", "acks", "timeouts", "collisions", "warnings")
 
 #: A velocity that is given as one number is met by what differs by less than this: cycles are
-#: whole microseconds, so 130 RPM are 129.98.
+#: whole microseconds, so 130 RPM are 130.04.
 VELOCITY_SLACK: Final = 0.5
 
 

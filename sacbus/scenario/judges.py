@@ -43,8 +43,8 @@ Verdict = Callable[[str | None], None]
 class Judge(Contract):
     """Looks for what is expected, from :meth:`begin` on."""
 
-    def begin(self) -> None:
-        """Time 0 of the expectation is now."""
+    def begin(self, since: Ns) -> None:
+        """Begin; the expectation's time 0 was ``since``, which in real time may be a little ago."""
         ...
 
 
@@ -90,8 +90,8 @@ class _Looks:
         self._span: Ns = self._lasting or timed.within
         self._until: Ns = 0
 
-    def begin(self) -> None:
-        self._until = self._bench.clock.now + self._span
+    def begin(self, since: Ns) -> None:
+        self._until = since + self._span
         self._see()
 
     def _see(self) -> None:
@@ -191,24 +191,23 @@ class _ShownLook:
 
 
 class _MotionJudge:
-    """Asks the recording once, now."""
+    """Asks the recording once, for what was until then."""
 
     def __init__(self, bench: Bench, verdict: Verdict, expected: Together | Straight) -> None:
         self._bench = bench
         self._verdict = verdict
         self._expected = expected
 
-    def begin(self) -> None:
+    def begin(self, since: Ns) -> None:
         bench, expected = self._bench, self._expected
         assert bench.tape is not None, "a bus is recorded whose motion is looked at"
         found = bench.tape.tracks(bench.name)
         tracks = {node: found[node] for node in expected.nodes}
-        now = bench.clock.now
         match expected:
             case Together(most=most):
-                self._verdict(self._together(start_skew(tracks, now), most))
+                self._verdict(self._together(start_skew(tracks, since), most))
             case Straight(most=farthest):
-                away = deviation(tracks, now)
+                away = deviation(tracks, since)
                 if away is None:
                     self._verdict("no motion")
                 else:
@@ -241,10 +240,13 @@ class _PacketJudge:
         self._others = 0
         self._over = False
 
-    def begin(self) -> None:
-        clock = self._bench.clock
-        self._bench.line.watchers.append(self._passed)
-        clock.at(clock.now + self._expected.within, self._late)
+    def begin(self, since: Ns) -> None:
+        line = self._bench.line
+        line.watchers.append(self._passed)
+        self._bench.clock.at(since + self._expected.within, self._late)
+        for passed in line.tail:
+            if passed.end > since and not self._over:
+                self._passed(passed)
 
     def _passed(self, passed: Passed) -> None:
         for event in self._decoders[passed.lane].receive(passed.data):
@@ -291,15 +293,16 @@ class _SilenceJudge:
         self._until: Ns = 0
         self._over = False
 
-    def begin(self) -> None:
+    def begin(self, since: Ns) -> None:
         clock = self._bench.clock
-        self._until = clock.now + self._expected.lasting
+        self._until = since + self._expected.lasting
         self._bench.line.watchers.append(self._passed)
         clock.at(self._until, self._end_of_time)
 
     def _passed(self, passed: Passed) -> None:
         source = self._expected.source
-        if passed.start < self._until and source in (None, passed.sender):
+        # What faults left nothing of has not been on the line.
+        if passed.data and passed.start < self._until and source in (None, passed.sender):
             self._end(f"{len(passed.data)} bytes of {passed.sender}")
 
     def _end_of_time(self) -> None:

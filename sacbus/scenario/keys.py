@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 #: Steps that a scenario may have when its loops are unrolled.
-MOST_STEPS: Final = 100_000
+MOST_STEPS: Final = 10_000
 
 _BOUNDS: Final = 'a number, [low, high], "<= 3" or ">= 3"'
 _NODES: Final = 'an address, addresses like "10-12,85", or "all"'
@@ -181,7 +181,7 @@ STEP: Final = (
     ),
     Key(
         "repeat",
-        "a whole number from 1 to 100000",
+        f"a whole number from 1 to {MOST_STEPS}",
         _whole(1, MOST_STEPS),
         "done so often; {round} counts from 1",
         default=1,

@@ -43,17 +43,18 @@ class Line:
     def __init__(self, protocol: Protocol) -> None:
         self.protocol = protocol
         self.watchers: list[Callable[[Passed], None]] = []
-        self._tail: deque[Passed] = deque(maxlen=KEPT)
+        #: The last that has passed, oldest first.
+        self.tail: deque[Passed] = deque(maxlen=KEPT)
 
     def note(self, passed: Passed) -> None:
         """A transmission is over."""
-        self._tail.append(passed)
+        self.tail.append(passed)
         for watcher in tuple(self.watchers):
             watcher(passed)
 
     def words(self, origin: Ns) -> tuple[str, ...]:
         """The tail, oldest first, one line each; times since ``origin``."""
-        return tuple(self._words(one, origin) for one in self._tail)
+        return tuple(self._words(one, origin) for one in self.tail)
 
     def _words(self, passed: Passed, origin: Ns) -> str:
         protocol = self.protocol

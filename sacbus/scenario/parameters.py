@@ -21,8 +21,8 @@ __all__ = ["RESERVED", "Value", "cases", "given", "is_value", "put_in"]
 
 Value = bool | int | float | str
 
-#: Names that steps give meaning to: ``each`` and ``repeat``.
-RESERVED: Final = ("node", "round")
+#: Names that steps give a meaning to, and by which key.
+RESERVED: Final = {"node": "each", "round": "repeat"}
 
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _PLACE: Final = re.compile(r"\{(\{?)([A-Za-z_][A-Za-z0-9_]*)\}(\}?)")
@@ -110,7 +110,9 @@ def _text(
 
 
 def _instead(name: str, scope: Mapping[str, Value]) -> str:
-    near = get_close_matches(name, [*scope, *RESERVED], n=1)
+    if name in RESERVED:
+        return f"{{{name}}} stands only where a step has {RESERVED[name]}"
+    near = get_close_matches(name, list(scope), n=1)
     if near:
         return f"did you mean {near[0]!r}?"
     known = ", ".join(scope) or "none"

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Final
 
 from sacbus.bus import FaultOn
-from sacbus.kernel import Ns
+from sacbus.kernel import SECOND, Ns
 from sacbus.mother import (
     Acknowledged,
     MotherError,
@@ -25,7 +25,7 @@ from sacbus.mother import (
     addressed_line,
 )
 from sacbus.scenario.bench import Bench
-from sacbus.scenario.expectations import Shown
+from sacbus.scenario.expectations import Counted, Shown
 from sacbus.scenario.judges import judge
 from sacbus.scenario.result import Failure, Result
 from sacbus.scenario.values import (
@@ -107,7 +107,8 @@ class Play:
             if before is not None:
                 self._followers[before].append(index)
             else:
-                self._clock.at(self._origin + (step.at or 0) + step.wait, self._meet, index)
+                begin = self._origin + (step.at or 0) + step.wait
+                self._clock.at(begin, self._meet, index, begin)
         if self._scenario.end is not None:
             self._clock.at(self._origin + self._scenario.end, self._end)
         elif not steps:
@@ -115,24 +116,25 @@ class Play:
 
     # ---- the order of steps ----
 
-    def _meet(self, index: int) -> None:
-        """A step's time has come; what it waits for first may not have."""
+    def _meet(self, index: int, since: Ns) -> None:
+        """A step's time has come, which was ``since``; what it waits for first may not have."""
         if self.over:
             return
         step = self._scenario.steps[index]
         if step.after is None or isinstance(step.after, str):
-            self._do(index)
+            self._do(index, since)
             return
 
         def met(got: str | None) -> None:
             if got is None:
-                self._clock.at(self._clock.now, self._do, index)
+                now = self._clock.now
+                self._clock.at(now, self._do, index, now)
             else:
                 self._settle(index, str(step.after), got)
 
-        judge(step.after, self._bench(step.after.bus), met).begin()
+        judge(step.after, self._bench(step.after.bus), met).begin(since)
 
-    def _do(self, index: int) -> None:
+    def _do(self, index: int, since: Ns) -> None:
         if self.over:
             return
         step = self._scenario.steps[index]
@@ -144,7 +146,7 @@ class Play:
             case Raw(data, bus):
                 bench = self._bench(bus)
                 bench.talk(data)
-                self._clock.at(self._clock.now + bench.span(len(data)), self._sent, index, bench)
+                self._out_at(self._clock.now + bench.span(len(data)), index, bench)
             case Disturb(fault, bus):
                 hosted = self._bench(bus).hosted
                 assert hosted is not None, "the rules have looked"
@@ -167,7 +169,7 @@ class Play:
                 self.result.expectations += 1
                 wanted = str(expected)
                 verdict = partial(self._settle, index, wanted)
-                judge(expected, self._bench(expected.bus), verdict).begin()
+                judge(expected, self._bench(expected.bus), verdict).begin(since)
 
     def _handle(self, deed: Type | Pin | Turn | Power) -> None:
         bench = self._bench(deed.bus)
@@ -185,21 +187,26 @@ class Play:
                 case Power(on=on):
                     panel.power(on=on)
 
-    def _settle(self, index: int, expected: str = "", got: str | None = None) -> None:
-        """A step is over, and what came of it if that was not as expected."""
+    def _settle(
+        self, index: int, expected: str = "", got: str | None = None, at: Ns | None = None
+    ) -> None:
+        """A step is over, and what came of it if that was not as expected.
+
+        ``at``: when it was over, if that has been noticed late, as in real time it is.
+        """
         if index not in self._open or self.over:
             return
         if got is not None:
             self._fail(index, expected, got)
         self._open.discard(index)
-        self._release(index)
+        self._release(index, self._clock.now if at is None else at)
 
-    def _release(self, index: int) -> None:
-        now = self._clock.now
+    def _release(self, index: int, at: Ns) -> None:
         for follower in self._followers[index]:
-            self._clock.at(now + self._scenario.steps[follower].wait, self._meet, follower)
+            begin = at + self._scenario.steps[follower].wait
+            self._clock.at(begin, self._meet, follower, begin)
         if self._open <= self._background and self._scenario.end is None:
-            self._clock.at(now, self._end)
+            self._clock.at(at, self._end)
 
     def _end(self) -> None:
         if self.over:
@@ -229,9 +236,12 @@ class Play:
         )
 
     def _states(self, bench: Bench, deed: object) -> tuple[str, ...]:
-        """The nodes that a step is about, as they are now."""
+        """The nodes that a step is about, as they are now; the last warnings if it counts them."""
         nodes = getattr(deed, "nodes", None) or ()
         found = []
+        if isinstance(deed, Counted) and "warnings" in deed.counts:
+            for when, text in bench.warned:
+                found.append(f"{(when - self._origin) / SECOND:.6f} s  {text}")
         for address in nodes[:4]:
             if address in bench.panels:
                 seen = bench.panels[address].snapshot()
@@ -287,7 +297,7 @@ class Play:
             self._background.discard(index)
             self._clock.at(self._clock.now + poll.lasting, self._poll_over, index, polling)
         else:
-            self._release(index)
+            self._release(index, self._clock.now)
 
     def _poll_failed(self, index: int, expected: str, got: str) -> None:
         if not self.over:
@@ -297,14 +307,19 @@ class Play:
         polling.stop()
         self._settle(index)
 
-    def _sent(self, index: int, bench: Bench) -> None:
-        """Raw bytes should be out by now; they are not while the line was taken."""
-        if waiting := bench.unsent():
-            self._clock.at(self._clock.now + bench.span(waiting), self._sent, index, bench)
-        elif bench.busy(self._clock.now):
-            self._clock.at(self._clock.now + bench.span(1), self._sent, index, bench)
-        else:
-            self._settle(index)
+    def _out_at(self, when: Ns, index: int, bench: Bench) -> None:
+        """Raw bytes should be out then; they are not while the line was taken."""
+
+        def out() -> None:
+            now = self._clock.now
+            if waiting := bench.unsent():
+                self._out_at(now + bench.span(waiting), index, bench)
+            elif bench.busy(now):
+                self._out_at(now + bench.span(1), index, bench)
+            else:
+                self._settle(index, at=when)
+
+        self._clock.at(when, out)
 
 
 class _Polling:

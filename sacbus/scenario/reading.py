@@ -132,6 +132,7 @@ class _CaseReader:
         for number, bus in enumerate(setup.buses):
             if bus.state is not None:
                 what = "expected none: what a scenario begins with must be the same every time"
+                self._findings.names["bus", number] = f"bus {bus.name!r}"
                 self._findings.add(("bus", number, "state"), what, "remove it")
         return tuple(self._seeded(bus, number) for number, bus in enumerate(setup.buses))
 

@@ -158,6 +158,7 @@ class _Rules:
         steps, end = self._scenario.steps, self._scenario.end
         if step.at is not None and step.after is not None:
             yield "after", "expected at or after, got both", "leave one out"
+            return
         if step.at is not None and end is not None and step.at > end:
             what = f"expected a time up to the end at {time_text(end)}, got {time_text(step.at)}"
             yield "at", what, "correct it"
@@ -203,7 +204,7 @@ class _Rules:
                 if not data:
                     yield "raw", "expected one byte at least, got none", "give some"
             case PacketSeen(pattern=pattern):
-                yield from self._pattern(pattern)
+                yield from self._pattern(pattern, key or "expect")
             case Shown(node=node):
                 yield from self._nodes(bus, (node,), key or "expect")
                 yield from self._terminals(bus, (node,), key or "expect")
@@ -265,12 +266,12 @@ class _Rules:
             have = f"nodes of bus {bus.name!r} ({ranges(there) or 'it has none'})"
             yield key, f"expected {have}, got {ranges(missing)}", "correct it"
 
-    def _pattern(self, pattern: str | None) -> Iterator[_Found]:
+    def _pattern(self, pattern: str | None, key: str) -> Iterator[_Found]:
         try:
             re.compile(pattern or "")
         except re.error as wrong:
             yield (
-                "pattern",
+                f"{key}.pattern",
                 f"expected a regular expression, got {pattern!r} ({wrong})",
                 "correct it",
             )

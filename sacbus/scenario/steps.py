@@ -123,6 +123,8 @@ class StepReader:
                 if node is not None:
                     inner["node"] = node
                 self._count += 1
+                if self._count > MOST_STEPS + 1:
+                    return found  # told already
                 if self._count > MOST_STEPS:
                     what = f"expected at most {MOST_STEPS} steps with all loops, got more"
                     self._findings.add(path, what, "loop less often")
@@ -279,7 +281,7 @@ class StepReader:
             else:
                 what = f"expected a level, 0 or 1, got {level!r}"
                 self._findings.add((*inner.path, name), what, "correct it")
-        if not levels:
+        if not value.keys() - {"node"}:
             self._findings.add(inner.path, "expected a pin and its level, got none", "give one")
         if not _has(inner, "node") or not levels:
             return None
