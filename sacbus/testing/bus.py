@@ -197,7 +197,7 @@ class VirtualBus:
         self._kernel_alone("await bus.expected(...)")
         one = self._wanted(expected, keys)
         came: list[str | None] = []
-        judge(one, self._bench, came.append).begin()
+        judge(one, self._bench, came.append).begin(self.now)
         while not came:
             self._step()
         self._settle(one, came[0])
@@ -255,7 +255,7 @@ class VirtualBus:
             if not came.done():
                 came.set_result(got)
 
-        judge(one, self._bench, verdict).begin()
+        judge(one, self._bench, verdict).begin(self.now)
         self._settle(one, await came)
 
     # ---- inside ----

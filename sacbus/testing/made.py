@@ -27,8 +27,15 @@ from sacbus.testing.bus import VirtualBus
 
 __all__ = ["BusMaker", "configured", "virtual_bus"]
 
-#: What is said of a bus; every other word is a setting of its nodes' kind.
-_OF_BUS: Final = ("nodes", "kind", "name", "baud", "lanes", "seed")
+#: What is said of a bus, and of what type; every other word is a setting of its nodes' kind.
+_OF_BUS: Final[Mapping[str, type]] = {
+    "nodes": object,
+    "kind": str,
+    "name": str,
+    "baud": int,
+    "lanes": int,
+    "seed": int,
+}
 
 #: What stands in the names of recordings as it is.
 _PLAIN: Final = re.compile(r"[^A-Za-z0-9_.-]+")
@@ -122,7 +129,7 @@ def configured(
     none of ``kind``, ``name``, ``baud``, ``lanes`` and ``seed`` is a setting of all nodes.
     SettingError, KindError or ConfigError for what cannot be.
     """
-    of_bus = {name: words[name] for name in _OF_BUS if name in words}
+    of_bus = {name: _typed(name, words[name]) for name in _OF_BUS if name in words}
     settings = {name: value for name, value in words.items() if name not in _OF_BUS}
     if file is None:
         bus = Configuration()
@@ -153,6 +160,15 @@ def configured(
     found = dataclasses.replace(bus, settings=settings, **of_bus)  # type: ignore[arg-type]
     check(found)
     return found
+
+
+def _typed(name: str, value: object) -> object:
+    wanted = _OF_BUS[name]
+    if isinstance(value, wanted) and (wanted is object or not isinstance(value, bool)):
+        return value
+    raise SettingError(
+        f"{name}: expected {'a text' if wanted is str else 'a whole number'}, got {value!r}"
+    )
 
 
 def _nodes(given: object, kind: str, settings: Mapping[str, object]) -> tuple[NodeAt, ...]:

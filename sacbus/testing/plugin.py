@@ -142,7 +142,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def _clock(request: pytest.FixtureRequest) -> Kernel:
     """The clock of this test's buses; where an async test could not run by it, it says why."""
     item = request.node
-    if inspect.iscoroutinefunction(request.function):
+    if inspect.iscoroutinefunction(request.function) or _in_a_loop():
         _refuse_foreign_loop(item)
     kernel: Kernel | None = item.stash.get(_kernel_of, None)
     if kernel is None:  # a plain test that asks for its bus while it runs
@@ -150,6 +150,17 @@ def _clock(request: pytest.FixtureRequest) -> Kernel:
 
         kernel = item.stash[_kernel_of] = Kernel()
     return kernel
+
+
+def _in_a_loop() -> bool:
+    """Whether a fixture is asked for by a coroutine that runs."""
+    import asyncio  # noqa: PLC0415 (wanted now)
+
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
 
 
 def _refuse_foreign_loop(item: pytest.Item) -> None:
