@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Final
 
 from sacbus.bus import PLAIN_BITS
 from sacbus.links.places import AdapterAt, Place
-from sacbus.node import Protocol, SettingError, find_kind, settings_from
+from sacbus.node import NodeKind, Protocol, SettingError, find_kind, settings_from
 
 __all__ = ["FASTEST", "SLOWEST", "Configuration", "NodeAt", "check"]
 
@@ -79,16 +78,18 @@ def check(configuration: Configuration) -> Protocol:
         raise SettingError(f"lanes: expected 1 or 2, got {configuration.lanes}")
     protocol = find_kind(configuration.kind).protocol
     seen: set[int] = set()
-    # Each kind is looked for once: that reads the metadata of all that is installed.
-    found = cache(find_kind)
     nodes = configuration.every_node
+    # Found once each: all that is installed is looked through for one.
+    kinds: dict[str, NodeKind] = {}
     for number, node in enumerate(nodes):
         if not 4 <= node.address <= 255:
             raise SettingError(f"nodes: expected addresses from 4 to 255, got {node.address!r}")
         if node.address in seen:
             raise SettingError(f"nodes: expected every address once, got {node.address} twice")
         seen.add(node.address)
-        kind = found(node.kind)
+        kind = kinds.get(node.kind)
+        if kind is None:
+            kind = kinds[node.kind] = find_kind(node.kind)
         settings_from(kind.settings, node.settings)
         if number == 0:
             protocol = kind.protocol

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
-from functools import cache, partial
+from functools import partial
 from typing import assert_never
 
 from sacbus.bus import Bus
@@ -51,9 +51,10 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
             state = StateDirectory(configuration.state, configuration.name)
             state.claim()
             stack.callback(state.release)
-        found = cache(find_kind)  # as in ``check``
-        for wanted in configuration.every_node:
-            kind = found(wanted.kind)
+        nodes = configuration.every_node
+        kinds = {name: find_kind(name) for name in {one.kind for one in nodes}}
+        for wanted in nodes:
+            kind = kinds[wanted.kind]
             settings = settings_from(kind.settings, wanted.settings)
             node = kind.create(wanted.address, settings, rate, bus.tell)
             if state is not None:

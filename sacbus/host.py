@@ -20,6 +20,7 @@ import asyncio
 import selectors
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Executor
+from contextvars import Context
 from math import inf
 from typing import Any, Final, TypeVar, TypeVarTuple
 from typing import Protocol as Contract
@@ -255,6 +256,8 @@ class _VirtualSelector(selectors.DefaultSelector):
     kernel: Kernel
     #: True once the loop has been asked to run something in a thread, which may take its time.
     threads = False
+    #: Set when the loop has been given something to do, which the kernel must not run away from.
+    called = False
 
     def select(self, timeout: float | None = None) -> list[Any]:
         ready = super().select(0)
@@ -262,6 +265,9 @@ class _VirtualSelector(selectors.DefaultSelector):
             return ready
         kernel = self.kernel
         when = kernel.next_at()
+        limit = None
+        # Only asyncio's own wake-up pipe is registered: nothing comes from outside, nor of threads.
+        alone = len(self.get_map()) <= 1 and not self.threads
         if timeout is not None:
             # Rounded up: a timer must not find itself a nanosecond short of its time.
             limit = kernel.now + int(timeout * SECOND) + 1
@@ -269,14 +275,20 @@ class _VirtualSelector(selectors.DefaultSelector):
                 kernel.run_until(limit)
                 return []
         elif when is None:
-            # Only asyncio's own wake-up pipe is registered: no descriptor can help, nor a thread.
-            if len(self.get_map()) <= 1 and not self.threads:
+            if alone:
                 raise Standstill(
                     "virtual time stands still: coroutines wait for something that no event on the "
                     "bus, no timer and no descriptor will ever bring"
                 )
             return super().select(None)
+        self.called = False
         kernel.run_next()
+        # To go round the loop for each of them would take longer than most of them do.
+        while alone and not self.called:
+            when = kernel.next_at()
+            if when is None or (limit is not None and when > limit):
+                break
+            kernel.run_until(when)
         return []
 
 
@@ -294,6 +306,44 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         """Bus time in seconds."""
         return self.kernel.now / SECOND
+
+    # Whatever gives the loop something to do passes through one of these.
+
+    def call_soon(
+        self,
+        callback: Callable[[*_Ts], object],
+        *args: *_Ts,
+        context: Context | None = None,
+    ) -> asyncio.Handle:
+        """As asyncio's."""
+        self._virtual_selector.called = True
+        return super().call_soon(callback, *args, context=context)
+
+    def call_at(
+        self,
+        when: float,
+        callback: Callable[[*_Ts], object],
+        *args: *_Ts,
+        context: Context | None = None,
+    ) -> asyncio.TimerHandle:
+        """As asyncio's."""
+        self._virtual_selector.called = True
+        return super().call_at(when, callback, *args, context=context)
+
+    def call_soon_threadsafe(
+        self,
+        callback: Callable[[*_Ts], object],
+        *args: *_Ts,
+        context: Context | None = None,
+    ) -> asyncio.Handle:
+        """As asyncio's."""
+        self._virtual_selector.called = True
+        return super().call_soon_threadsafe(callback, *args, context=context)
+
+    def stop(self) -> None:
+        """As asyncio's."""
+        self._virtual_selector.called = True
+        super().stop()
 
     def run_in_executor(
         self, executor: Executor | None, func: Callable[[*_Ts], _T], *args: *_Ts

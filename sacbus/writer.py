@@ -1,4 +1,4 @@
-"""Standard output that nobody can hold up: what a reader does not take in time is lost, counted.
+"""An output that nobody can hold up: what a reader does not take in time is lost, counted.
 
 Owns the thread that writes. Reports come from within the bus; were they written there, a reader
 that stops reading would stop the bus, its signals included. A leaf beside the command line.
@@ -30,13 +30,19 @@ PATIENCE: Final = 2.0
 
 
 class Writer:
-    """Writes texts in order, from a thread of its own. To be made in a running event loop.
+    """Writes texts or bytes in order, from a thread of its own. To be made in a running event loop.
 
-    ``lost`` is told once, in the loop, when nothing can be written any more. ``missed(count)``
-    gives the text that stands where texts are missing.
+    ``output`` is the descriptor that they go to, standard output's if none is given; whoever opened
+    it closes it. ``lost`` is told once, in the loop, when nothing can be written any more.
+    ``missed(count)`` gives the text that stands where texts are missing.
     """
 
-    def __init__(self, lost: Callable[[OSError], None], missed: Callable[[int], str]) -> None:
+    def __init__(
+        self,
+        lost: Callable[[OSError], None],
+        missed: Callable[[int], str | bytes],
+        output: int | None = None,
+    ) -> None:
         self._loop = asyncio.get_running_loop()
         self._lost: Callable[[OSError], None] | None = lost
         self._missed_text = missed
@@ -44,17 +50,17 @@ class Writer:
         #: Whether somebody waits in :meth:`room`, and what tells them.
         self._held_back = False
         self._room = asyncio.Event()
-        self._texts: queue.Queue[str | None] = queue.Queue(WAITING)
-        try:
+        self._texts: queue.Queue[str | bytes | None] = queue.Queue(WAITING)
+        self._output = output
+        if output is None:
             # The descriptor itself: a buffer's lock, held by a thread that waits, blocks the exit.
-            self._output: int | None = sys.stdout.fileno()
-        except io.UnsupportedOperation:  # replaced, as in tests
-            self._output = None
+            with contextlib.suppress(io.UnsupportedOperation):  # replaced, as in tests
+                self._output = sys.stdout.fileno()
         self._thread = threading.Thread(target=self._run, name="sacbus output", daemon=True)
         self._thread.start()
 
-    def say(self, text: str) -> None:
-        """Have a text written; never waits and never raises."""
+    def say(self, text: str | bytes) -> bool:
+        """Have a text written, and whether it will be; never waits and never raises."""
         try:
             if self._missed:
                 self._texts.put_nowait(self._missed_text(self._missed))
@@ -62,6 +68,8 @@ class Writer:
             self._texts.put_nowait(text)
         except queue.Full:
             self._missed += 1
+            return False
+        return True
 
     async def room(self) -> None:
         """Wait while much waits to be written: for whoever can stop what they read from."""
@@ -99,10 +107,14 @@ class Writer:
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(callback, *arguments)
 
-    def _write(self, text: str) -> None:
-        if self._output is None:
+    def _write(self, text: str | bytes) -> None:
+        if isinstance(text, bytes):
+            rest = text
+        elif self._output is None:
             sys.stdout.write(text)
             return
-        rest = text.encode(sys.stdout.encoding, "replace")
+        else:
+            rest = text.encode(sys.stdout.encoding, "replace")
+        assert self._output is not None  # of bytes
         while rest:
             rest = rest[os.write(self._output, rest) :]

@@ -207,6 +207,13 @@ def bus() -> Iterator[Sacbus]:
         yield sacbus
 
 
+def test_the_dissector_is_where_it_says(capsys: Captured) -> None:
+    assert run(["dissector"]) == 0
+    path = Path(capsys.readouterr().out.removesuffix("\n"))
+    assert path.name == "sac.lua"
+    assert path.read_text(encoding="utf-8").startswith("-- A Wireshark dissector")
+
+
 def test_send_says_who_acknowledged_and_how_soon(capsys: Captured, bus: Sacbus) -> None:
     assert run(["send", bus.link, "10m400"]) == 0
     written = capsys.readouterr()

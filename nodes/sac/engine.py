@@ -19,7 +19,7 @@ from sacbus.kernel import Ns
 from sacbus.motion import TICKS_PER_US, Entry, Profile, Slip, State, Timebase, lost, slips
 from sacbus.motion.ramp import Ticks64
 
-__all__ = ["Engine", "Standing", "Where"]
+__all__ = ["FROM_REST", "Engine", "Standing", "Where"]
 
 #: A tick of an oscillator without error.
 NOMINAL: Final = Timebase()
@@ -64,7 +64,7 @@ class Standing(NamedTuple):
 #: What most engines hold most of the time, one for all of them.
 _AT_ZERO: Final = Where()
 _AT_REST: Final = _Left()
-_FROM_REST: Final = Entry()
+FROM_REST: Final = Entry()
 
 
 class Engine:
@@ -103,7 +103,7 @@ class Engine:
         self._left = _AT_REST
         #: How the motor comes into the present profile, and where it does not follow that; None:
         #: not looked at yet.
-        self._entry = _FROM_REST
+        self._entry = FROM_REST
         self._slips: list[Slip] | None = None
         #: When the present profile's first pulse is issued, it may be to come; None: never, as long
         #: as the clock stands still.
@@ -322,7 +322,7 @@ class Engine:
         span, tick = self.clock.span, self._tick
         if self.started is None:
             self.started = self._anchor + span(-tick)
-            self._entry = _FROM_REST
+            self._entry = FROM_REST
             left = self._left
             if left is not _AT_REST and self.started <= left.until:
                 self._entry = Entry(self._sign * left.rpm, left.stalled)

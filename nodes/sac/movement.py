@@ -13,16 +13,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from nodes.sac.command import CommandProcessor, shortest
-from nodes.sac.engine import Engine, Standing, Where
+from nodes.sac.engine import FROM_REST, Engine, Standing, Where
 from nodes.sac.memory import Memory
 from sacbus.kernel import Ns
 from sacbus.language import Defaults, Motion
 from sacbus.motion import Drive, Entry, Profile, Rpm, State, Timebase, plan
+from sacbus.motion.legs import Leg
 from sacbus.motion.profile import WINDOW_END
 from sacbus.motion.stored import profile_from, store_profile
 from sacbus.movement import Watcher
@@ -33,7 +34,10 @@ if TYPE_CHECKING:
 __all__ = ["Moving", "SacMovement", "SacSegment", "SacShape"]
 
 _STANDBY: Final = State.STANDBY.name
-_FROM_REST: Final = Entry()
+#: Texts of profiles that are kept for nodes that are alike.
+SHAPES_KEPT: Final = 1_024
+
+_Key = TypeVar("_Key")
 
 
 class Moving(Protocol):
@@ -74,7 +78,7 @@ class _Board(NamedTuple):
 class SacMovement:
     """The motion of one node, in the shape of ``sacbus.movement.Movement``."""
 
-    __slots__ = ("_engine", "_node", "_standing", "_watcher", "_word")
+    __slots__ = ("_engine", "_memory", "_ms", "_node", "_shapes", "_standing", "_watcher", "_word")
 
     def __init__(self, node: Moving) -> None:
         self._node = node
@@ -83,6 +87,10 @@ class SacMovement:
         self._engine = node.engine
         self._standing = node.engine.standing
         self._word = ""
+        #: The shapes of nodes with such a board, and what made it one.
+        self._memory = node.obeyed
+        self._ms = -1
+        self._shapes: _Shapes | None = None
 
     def watch(self, watcher: Watcher | None, now: Ns) -> None:
         """Have ``watcher`` told at once how the node moves, and of each change; None: nobody."""
@@ -92,13 +100,18 @@ class SacMovement:
 
     def look(self, now: Ns) -> None:
         """Tell of what has changed since the last look; the node does so after all it does."""
-        engine = self._node.engine
-        word = self._idle_word()
-        if word == self._word and engine is self._engine and engine.stands_as(self._standing):
-            return
-        anew = engine is not self._engine
-        self._engine = engine
-        self._tell(now, word, anew=anew)
+        node = self._node
+        engine = node.engine
+        word = node.off_or_booting
+        if not word and node.commands.held is not None:
+            word = "SYNC"
+        if engine is self._engine:
+            if word == self._word and engine.stands_as(self._standing):
+                return
+            self._tell(now, word, anew=False)
+        else:
+            self._engine = engine
+            self._tell(now, word, anew=True)
 
     def _idle_word(self) -> str:
         """The state whatever the engine does; empty where that is the engine's own."""
@@ -107,23 +120,30 @@ class SacMovement:
 
     def _tell(self, now: Ns, word: str, *, anew: bool) -> None:
         self._word = word
+        clock = self._standing.clock
         standing = self._standing = self._engine.standing
         if self._watcher is None:
             return
         node = self._node
-        memory = node.obeyed
-        board = _Board(
-            standing.clock, memory.ustep, memory.cw, int(bool(memory.ops)), node.microstep_pins
-        )
+        shapes = self._shapes
+        if (
+            shapes is None
+            or standing.clock is not clock
+            or node.obeyed is not self._memory
+            or node.microstep_pins != self._ms
+        ):
+            shapes = self._see_board(standing.clock)
         profile = standing.profile
-        if profile is None:
-            shape = _shape_at_rest(board)
-        elif profile.is_laid_out:
-            shape = _shape(profile, board, node.commands.session.defaults)
-        else:
-            defaults = node.commands.session.defaults
-            shape = _shape_of(profile.motion, profile.drive, profile.start_rpm, board, defaults)
+        shape = shapes.at_rest if profile is None else shapes.of(profile)
         self._watcher(now, shape, _values(standing, word, anew=anew))
+
+    def _see_board(self, clock: Timebase) -> _Shapes:
+        node = self._node
+        memory = self._memory = node.obeyed
+        ms = self._ms = node.microstep_pins
+        board = _Board(clock, memory.ustep, memory.cw, int(bool(memory.ops)), ms)
+        self._shapes = _shapes_on(board, node.commands.session.defaults)
+        return self._shapes
 
 
 def _values(standing: Standing, word: str, *, anew: bool) -> str:
@@ -138,37 +158,57 @@ def _values(standing: Standing, word: str, *, anew: bool) -> str:
         started = "null" if standing.started is None else standing.started
         text += f',"anchor":{standing.anchor},"tick":{standing.tick},"started":{started}'
         entry = standing.entry
-        if entry != _FROM_REST:
+        if entry is not FROM_REST:
             text += f',"entry":[{float(entry.rpm)!r},{"true" if entry.stalled else "false"}]'
     return text
 
 
-@lru_cache(maxsize=256)
-def _shape_at_rest(board: _Board) -> str:
-    return _text({"board": _store_board(board), "profile": None})
+class _Shapes:
+    """The shapes, as text, of nodes that have the same board and the same defaults."""
+
+    def __init__(self, board: _Board, defaults: Defaults) -> None:
+        self._defaults = defaults
+        self._board = {**board._asdict(), "clock": [board.clock.ns, board.clock.ticks]}
+        self.at_rest = _text({"board": self._board, "profile": None})
+        #: Of profiles that are not laid out by what they were planned from, since the planner makes
+        #: the same ones again; of others by what they are.
+        self._planned: dict[tuple[Motion, Drive, Rpm], str] = {}
+        self._laid_out: dict[tuple[Motion, Drive, int | None, tuple[Leg, ...]], str] = {}
+
+    def of(self, profile: Profile) -> str:
+        """That of a profile."""
+        motion, drive = profile.motion, profile.drive
+        if profile.is_laid_out:
+            laid_out = motion, drive, profile.duration, profile.course.legs
+            text = self._laid_out.get(laid_out)
+            if text is None:
+                text = _keep(self._laid_out, laid_out, self._text_of(profile))
+            return text
+        planned = motion, drive, profile.start_rpm
+        text = self._planned.get(planned)
+        if text is None:
+            text = _keep(self._planned, planned, self._text_of(plan(*planned)))
+        return text
+
+    def _text_of(self, profile: Profile) -> str:
+        return _text(
+            {
+                "command": shortest(profile.motion, self._defaults),
+                "board": self._board,
+                "profile": store_profile(profile),
+            }
+        )
 
 
-@lru_cache(maxsize=4_096)
-def _shape_of(
-    motion: Motion, drive: Drive, start_rpm: Rpm, board: _Board, defaults: Defaults
-) -> str:
-    """That of a profile which nothing has cut into; the planner makes the same one again."""
-    return _shape(plan(motion, drive, start_rpm), board, defaults)
+def _keep(texts: dict[_Key, str], key: _Key, text: str) -> str:
+    if len(texts) >= SHAPES_KEPT:
+        texts.clear()
+    texts[key] = text
+    return text
 
 
-def _shape(profile: Profile, board: _Board, defaults: Defaults) -> str:
-    return _text(
-        {
-            "command": shortest(profile.motion, defaults),
-            "board": _store_board(board),
-            "profile": store_profile(profile),
-        }
-    )
-
-
-def _store_board(board: _Board) -> Mapping[str, object]:
-    clock = board.clock
-    return {**board._asdict(), "clock": [clock.ns, clock.ticks]}
+#: Of all nodes with the same board.
+_shapes_on = lru_cache(maxsize=64)(_Shapes)
 
 
 def _text(stored: Mapping[str, object]) -> str:
@@ -213,15 +253,9 @@ class SacSegment:
                 anchor=values["anchor"] if profile is not None else 0,
                 tick=values["tick"] if profile is not None else 0,
                 started=values["started"] if profile is not None else 0,
-                entry=_FROM_REST if entry is None else Entry(*entry),
+                entry=FROM_REST if entry is None else Entry(*entry),
             )
         )
-
-    @property
-    def motion(self) -> Motion | None:
-        """The command that runs; None when none does."""
-        profile = self._engine.profile
-        return None if profile is None else profile.motion
 
     @property
     def started(self) -> Ns | None:

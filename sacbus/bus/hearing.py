@@ -5,7 +5,7 @@ Owns whom each keeps from hearing or makes hear otherwise, and what becomes of w
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -70,7 +70,7 @@ class Cut:
     Each side hears and disturbs its own alone. Counts what somebody missed.
     """
 
-    beyond: frozenset[int]
+    beyond: Collection[int]
     name: ClassVar[str] = "cut"
 
     def put_on(self, on: FaultOn) -> Strike:
@@ -150,10 +150,10 @@ class Latency:
 
 @dataclass(frozen=True, slots=True)
 class LateDirection:
-    """A driver stays enabled for ``by`` ns after its last bit: whoever talks then is spoilt.
+    """A driver stays enabled for ``by`` ns after its last bit: whoever begins then is spoilt.
 
     That of the node at the address ``node``, or else of the ``link`` of that name, None: of every
-    link. Counts what was spoilt.
+    link. Bytes that begin in that time arrive as others. Counts whom it spoilt.
     """
 
     by: Ns
@@ -179,8 +179,12 @@ class LateDirection:
                 held[sent.lane] = (end, end + self.by)
                 return
             begin, end = held.get(sent.lane, (0, 0))
-            if max(begin, sent.start) < min(end, sent.end):
-                sent.hit(max(begin, sent.start), min(end, sent.end))
+            if not begin <= sent.start < end:
+                return
+            struck = sum(start < end for start in passage.begins)
+            for index in range(struck):
+                passage.values[index] ^= on.random.randint(1, 255)
+            if struck:
                 on.acts(passage)
 
         return strike

@@ -336,8 +336,12 @@ class Medium:
         if passage.end is not None:
             sent.end = passage.end
         if not passage.silent:
+            pieces = passage.pieces()
+            if pieces:
+                # The line is taken until the last byte has arrived, however late it is.
+                sent.end = max(sent.end, pieces[-1].end)
             self._occupy(sent, passage, collides=collides)
-            for piece in passage.pieces():
+            for piece in pieces:
                 self._send_piece(piece, passage, passage.reaches)
             for address, rate in passage.receivers.items():
                 for piece in passage.as_read_at(rate).pieces(rate):
@@ -355,7 +359,6 @@ class Medium:
         counters.transmissions += 1
         counters.bytes += len(sent.data)
         counters.busy += sent.end - sent.start
-        counters.collided += sent.collided
         if collides:
             place.active = [other for other in place.active if other.end > sent.start]
             for other in place.active:
@@ -407,7 +410,7 @@ class Medium:
                 if owner is not piece.sender or (passage.echoes and passage.echoes(listener)):
                     late = passage.late(listener) if passage.late else 0
                     if late:
-                        self.kernel.at(now + late, listener.hear, heard, now + late)
+                        self.kernel.at(now + late, self._give, piece.lane, listener, heard)
                     else:
                         listener.hear(heard, now)
         if upto < size:
@@ -418,6 +421,11 @@ class Medium:
         if not passage.left:
             # Later than the last piece when the end of it was lost.
             self.kernel.at(sent.end, self._end, sent)
+
+    def _give(self, lane: int, listener: Listener, heard: Heard) -> None:
+        """Hand on what came late, unless the listener has left."""
+        if any(one is listener for _, one in self._lanes[lane].listeners):
+            listener.hear(heard, self.kernel.now)
 
     def _heard(self, piece: Transmission, first: int, upto: int) -> Heard:
         return Heard(

@@ -186,6 +186,16 @@ class Passage:
             return b""
         return b"".join(piece.arrived(0, len(piece.data), seed) for piece in self._over())
 
+    def heard_by(self, listener: int | None, seed: int) -> bytes:
+        """All that came to one who listened: the node of an address, or EVERY_LINK."""
+        if listener in self.missed and listener not in self.receivers:
+            return b""
+        rate = None if listener is None else self.receivers.get(listener)
+        if rate is None:
+            return self.outcome(seed)
+        pieces = self.as_read_at(rate).pieces(rate)
+        return b"".join(piece.data for piece in pieces)
+
     def outcome_ninth(self, seed: int) -> bytes | None:
         """The ninth bits that belong to :meth:`outcome`; None where none were sent."""
         if self.ninth is None or self.silent:

@@ -17,6 +17,7 @@ import click
 
 from sacbus import __version__
 from sacbus.cli.check import check_command
+from sacbus.cli.dissector import dissector_command
 from sacbus.cli.eeprom import eeprom_group
 from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
@@ -63,6 +64,7 @@ for command in (
     check_command,
     eeprom_group,
     kinds_command,
+    dissector_command,
 ):
     root.add_command(command)
 

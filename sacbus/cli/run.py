@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
 
 import click
@@ -16,6 +17,7 @@ from sacbus.cli.options import verbose
 
 if TYPE_CHECKING:
     from sacbus.scenario import Result, Scenario
+    from sacbus.trace import Recording
 
 __all__ = ["run_command"]
 
@@ -58,6 +60,9 @@ def _read_parameters(
     "--record", type=click.Path(dir_okay=False), metavar="FILE", help="Keep a recording of it."
 )
 @click.option(
+    "--pcap", type=click.Path(dir_okay=False), metavar="FILE", help="Write pcapng for Wireshark."
+)
+@click.option(
     "--junit",
     type=click.File("w", encoding="utf-8", lazy=True),
     metavar="FILE",
@@ -75,6 +80,7 @@ def run_command(
     word: str | None,
     first: bool,
     record: str | None,
+    pcap: str | None,
     junit: IO[str] | None,
     as_json: bool,
 ) -> int:
@@ -91,23 +97,27 @@ def run_command(
 
     if real and link is not None:
         raise click.UsageError("expected --real or --link, got both")
-    if record is not None and link is not None:
+    pages = {"--record": record, "--pcap": pcap}
+    kept = [option for option, path in pages.items() if path is not None]
+    if kept and link is not None:
         raise click.UsageError(
-            "--record: expected a bus in this process, got --link, see sacbus monitor"
+            f"{kept[0]}: expected a bus in this process, got --link, see sacbus monitor"
         )
     if speed is not None and not real:
         raise click.UsageError("--speed: expected only with --real")
     chosen = _read(files, parameters, seed, word, line_only=link is not None)
     if not chosen:
         raise click.UsageError(f"-k: no file, title or case has {word!r} in it")
-    if record is not None and len(chosen) > 1:
+    if kept and len(chosen) > 1:
         raise click.UsageError(
-            f"--record: expected one scenario of one case, got {len(chosen)}, use -k or --set"
+            f"{kept[0]}: expected one scenario of one case, got {len(chosen)}, use -k or --set"
         )
     results: list[Result] = []
     for scenario in chosen:
-        with _Progress(scenario) as progress, _opened(record) as file:
+        with _Progress(scenario) as progress, _opened(record, bool(kept)) as file:
             result = _played(scenario, real, link, speed, file, progress.come_to)
+            if result.recording is not None:
+                _export(result.recording, pcap)
         results.append(result)
         if not as_json:
             _tell(result)
@@ -169,13 +179,22 @@ def _played(
 
 
 @contextmanager
-def _opened(path: str | None) -> Iterator[BinaryIO | None]:
-    """The file of a recording, for writing it and for reading it back."""
-    if path is None:
+def _opened(path: str | None, needed: bool) -> Iterator[BinaryIO | None]:
+    """The file of a recording, for writing and for reading back; one without a name if need be."""
+    if path is None and not needed:
         yield None
         return
-    with Path(path).open("w+b") as file:
+    with TemporaryFile("w+b") if path is None else Path(path).open("w+b") as file:
         yield file
+
+
+def _export(recording: Recording, pcap: str | None) -> None:
+    """Write what is made of a recording. Each form is loaded only where it is asked for."""
+    if pcap is not None:
+        from sacbus.trace import write_pcapng
+
+        with Path(pcap).open("wb") as file:
+            write_pcapng(recording, file)
 
 
 def _tell(result: Result) -> None:

@@ -1,7 +1,6 @@
-"""The monitor: what is said on a line, decoded as it happens.
+"""The monitor: what is said on a line, shown as it happens.
 
-``watch.py`` is the core: told bytes or transmissions with their times, it gives entries
-(``entries.py``). ``page.py`` writes entries as text or JSON. Neither knows an event loop or a
-clock. ``run.py`` runs them on a bus's feed, or on a link of its own, to which it never writes. A
-leaf beside the command line: nothing else imports it.
+What it means is told by ``sacbus.watch``, as entries. ``page.py`` writes entries as text or JSON
+and knows no event loop and no clock; ``run.py`` runs it all on a bus's feed, or on a link of its
+own, to which it never writes. A leaf beside the command line: nothing else imports it.
 """

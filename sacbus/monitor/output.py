@@ -1,11 +1,13 @@
 """Where the monitor's entries go: standard output for them, standard error for words about them.
 
-Owns the choice of what is shown, and the form. Texts are written by a thread (``sacbus.writer``),
-so that a reader who does not read holds up nothing but the monitor's own reading.
+Owns the choice of what is shown, and the form: lines, a capture (``pcap.py``), or both. Texts are
+written by a thread (``sacbus.writer``), so that a reader who does not read holds up nothing but the
+monitor's own reading.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from collections.abc import Callable, Iterable
@@ -14,10 +16,10 @@ from datetime import UTC, datetime, timedelta
 import click
 
 from sacbus.kernel import US, Ns
-from sacbus.monitor.entries import Entry, concerns, is_fault
 from sacbus.monitor.page import JsonPage, TextPage, printable
-from sacbus.monitor.summary import Summary
+from sacbus.monitor.pcap import Looked, PcapOutput
 from sacbus.monitor.wanted import Wanted
+from sacbus.watch import Entry, Summary, concerns, is_fault
 from sacbus.writer import Writer
 
 __all__ = ["Output", "WallClock"]
@@ -36,6 +38,11 @@ class WallClock:
     def set(self, time: Ns, clock: int, speed: float = 1.0) -> None:
         """At ``time`` of the line it was ``clock``, ns since 1970; the line's time runs as fast."""
         self._time, self._clock, self._speed = time, clock, speed
+
+    @property
+    def offset(self) -> Ns:
+        """What that moment's time of the line lacks to its time of day, ns since 1970."""
+        return self._clock - self._time
 
     def __call__(self, time: Ns) -> datetime:
         """Local time, to the microsecond."""
@@ -57,24 +64,40 @@ class Output:
         self._wanted = wanted
         self._text = TextPage(colour=_is_terminal(), verbose=wanted.verbose, clock=clock)
         self._json = JsonPage(clock=clock) if wanted.as_json else None
+        self._pcap = None if wanted.pcap is None else PcapOutput(wanted.pcap, lost)
+        self._captures_alone = wanted.pcap == _standard_output()
         self._writer = Writer(lost, self._missed)
-        self.room = self._writer.room
 
-    def begin(self, words: str, fields: dict[str, object], bus: str | None = None) -> None:
-        """What is looked at from now on: words for people, fields for programs; the bus's name."""
+    def begin(self, words: str, fields: dict[str, object], line: Looked) -> None:
+        """What is looked at from now on: words for people, fields for programs; the line itself."""
         self.begun = True
+        if self._pcap is not None:
+            self._pcap.begin(line, self.clock.offset)
+        if self._captures_alone:
+            self._remark(words)
+            return
         if self._json is None:
             self._remark(f"{words}\n{self._text.heading()}")
         else:
-            self._json.bus = bus
+            self._json.bus = line.bus
             self._write("monitor", fields)
 
     def show(self, entries: Iterable[Entry]) -> None:
         """Those that are wanted."""
         page = self._json or self._text
         for entry in entries:
-            if self._is_wanted(entry):
+            if not self._is_wanted(entry):
+                continue
+            if self._pcap is not None:
+                self._pcap.show(entry)
+            if not self._captures_alone:
                 self._writer.say(f"{page.line(entry)}\n")
+
+    async def room(self) -> None:
+        """Wait while much waits to be written."""
+        await self._writer.room()
+        if self._pcap is not None:
+            await self._pcap.room()
 
     def remark(self, words: str) -> None:
         """Something about the monitor itself."""
@@ -87,13 +110,15 @@ class Output:
         """Nothing more comes but this."""
         if self._json is not None:
             self._write("summary", summary.as_fields())
-        self._writer.close()
+        self.close()
         if self._json is None:
             self._remark(summary.as_text())
 
     def close(self) -> None:
         """Nothing more comes at all."""
         self._writer.close()
+        if self._pcap is not None:
+            self._pcap.close()
 
     def _is_wanted(self, entry: Entry) -> bool:
         wanted = self._wanted
@@ -116,3 +141,10 @@ class Output:
 
 def _is_terminal() -> bool:
     return sys.stdout.isatty()
+
+
+def _standard_output() -> int | None:
+    try:
+        return sys.stdout.fileno()
+    except io.UnsupportedOperation:  # replaced, as in tests
+        return None

@@ -13,7 +13,8 @@ from typing import Any, Final, assert_never
 import click
 
 from sacbus.kernel import US, Ns
-from sacbus.monitor.entries import (
+from sacbus.node import Report
+from sacbus.watch import (
     Collision,
     Entry,
     Lost,
@@ -22,7 +23,6 @@ from sacbus.monitor.entries import (
     Unanswered,
     is_fault,
 )
-from sacbus.node import Report
 
 __all__ = ["JsonPage", "TextPage", "printable"]
 

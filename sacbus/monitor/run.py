@@ -18,8 +18,8 @@ from sacbus.feed import Feed, SeveralBuses, find
 from sacbus.links import LinkError
 from sacbus.monitor.output import Output
 from sacbus.monitor.sources import watch_feed, watch_link
-from sacbus.monitor.summary import Summary
 from sacbus.monitor.wanted import Wanted
+from sacbus.watch import Summary
 
 __all__ = ["monitor"]
 

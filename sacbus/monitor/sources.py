@@ -14,10 +14,10 @@ from sacbus.feed import Feed, Hello, Missed, Reached, Sent, Stopped
 from sacbus.kernel import SECOND, LineRate, Ns
 from sacbus.links import open_line
 from sacbus.monitor.output import Output
-from sacbus.monitor.summary import Summary
+from sacbus.monitor.pcap import Looked
 from sacbus.monitor.wanted import Wanted
-from sacbus.monitor.watch import FEED_SLACK, LINK_SLACK, Watch
 from sacbus.node import KindError, Protocol, Report, find_kind, kinds
+from sacbus.watch import FEED_SLACK, LINK_SLACK, Summary, Watch
 
 __all__ = ["watch_feed", "watch_link"]
 
@@ -37,7 +37,9 @@ async def watch_feed(feed: Feed, wanted: Wanted, output: Output, summary: Summar
             summary=summary,
         )
         output.clock.set(hello.time, hello.clock, hello.speed)
-        output.begin(_in_words(hello), _in_fields(hello, wanted.link), hello.bus)
+        rate = LineRate(hello.baud, hello.bits)
+        line = Looked(hello.bus, hello.bus, hello.protocol, rate, hello.lanes, "exact times")
+        output.begin(_in_words(hello), _in_fields(hello, wanted.link), line)
         return await _follow(feed, watch, output)
     except ValueError as fault:
         return f"the bus cannot be understood ({fault})"
@@ -91,7 +93,8 @@ async def watch_link(link: str, wanted: Wanted, output: Output, summary: Summary
     async with open_line(link, rate.baud, rts=False) as line:
         start = loop.time()
         output.clock.set(0, time.time_ns())
-        output.begin(*_of_link(link, protocol, rate))
+        looked = Looked(link, None, protocol.name, rate, 1, "times of arrival")
+        output.begin(*_of_link(link, protocol, rate), looked)
 
         def now() -> Ns:
             # Rounded: a timer that fires at its very time must not find itself a nanosecond early.

@@ -14,7 +14,8 @@ class Wanted:
     ``link``: a path or URL; None for the one bus that runs here. ``baud`` and ``kind`` are for a
     link that no bus of ours serves; None: the kind's own rate, and ``sac``. ``nodes`` and
     ``errors`` leave out entries that are not about these nodes, or no fault. ``clock``: time of
-    day. ``wait``: for what is not there yet, or has gone.
+    day. ``wait``: for what is not there yet, or has gone. ``pcap``: a descriptor to which a capture
+    is written, by its number; standard output's puts it in place of the text.
     """
 
     link: str | None = None
@@ -26,3 +27,4 @@ class Wanted:
     wait: bool = False
     nodes: frozenset[int] = frozenset()
     errors: bool = False
+    pcap: int | None = None

@@ -7,8 +7,8 @@ comes from, not the command alone: a recording stays true when the planner is ch
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields
-from typing import Any
+from dataclasses import fields
+from typing import Any, Final
 
 from sacbus.language import Motion
 from sacbus.motion.drive import Drive
@@ -20,18 +20,20 @@ from sacbus.motion.ramp import Ramp
 
 __all__ = ["profile_from", "store_profile"]
 
+#: What is stored of each; how a motion was said is not: two that differ in that are equal.
+_MOTION: Final = tuple(one.name for one in fields(Motion) if one.compare)
+_DRIVE: Final = tuple(one.name for one in fields(Drive) if one.init)
+
 #: What JSON gives for an object; ``Any``: whatever stands in it, which is checked as it is used.
 Stored = Mapping[str, Any]
 
 
 def store_profile(profile: Profile) -> dict[str, object]:
     """Everything that tells a profile's pulses; what planned it is left out."""
-    motion = asdict(profile.motion)
-    del motion["by_cycle"]  # how it was said: two that differ in it are equal
-    drive = profile.drive
+    motion, drive = profile.motion, profile.drive
     return {
-        "motion": motion,
-        "drive": {one.name: getattr(drive, one.name) for one in fields(drive) if one.init},
+        "motion": {name: getattr(motion, name) for name in _MOTION},
+        "drive": {name: getattr(drive, name) for name in _DRIVE},
         "duration": profile.duration,
         "legs": [_store(leg) for leg in profile.course.legs],
     }

@@ -179,11 +179,12 @@ class _Reader:
 
     def __init__(self, buses: tuple[BusAt, ...]) -> None:
         self._buses = buses
+        nodes = [node for bus in buses for node in bus.nodes]
+        self._by_name = {name: find_kind(name) for name in sorted({one.kind for one in nodes})}
         #: By bus and address.
-        self._kinds: dict[tuple[int, int], NodeKind] = {}
-        for bus in buses:
-            for node in bus.nodes:
-                self._kinds[node.bus, node.address] = find_kind(node.kind)
+        self._kinds: dict[tuple[int, int], NodeKind] = {
+            (node.bus, node.address): self._by_name[node.kind] for node in nodes
+        }
         self._shapes: dict[int, object] = {}
         self._makers: Mapping[str, Callable[[Stored], Record | None]] = {
             "sent": self._sent,
@@ -223,7 +224,7 @@ class _Reader:
         )
 
     def _shape(self, stored: Stored) -> None:
-        self._shapes[stored["shape"]] = find_kind(stored["kind"]).shape(stored)
+        self._shapes[stored["shape"]] = self._by_name[stored["kind"]].shape(stored)
 
     def _moves(self, stored: Stored) -> Moved:
         bus, node, when = stored["bus"], stored["node"], stored["t"]

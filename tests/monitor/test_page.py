@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 
 from sacbus.kernel import MS, SECOND, US, Ns
-from sacbus.monitor.entries import Collision, Entry, Lost
 from sacbus.monitor.page import JsonPage, TextPage
+from sacbus.watch.entries import Collision, Entry, Lost
 from sacbus.wire import ack, encode, nak
 from tests.bus.strategies import bursts
-from tests.monitor.rig import M400, Rig
+from tests.watch.rig import M400, Rig
 
 
 def scene() -> list[Entry]:

@@ -10,7 +10,7 @@ from statistics import median
 from typing import Final
 
 from sacbus.kernel import US, Ns
-from sacbus.monitor.entries import Collision, Entry, Lost, Reported, Spoken, Unanswered
+from sacbus.watch.entries import Collision, Entry, Lost, Reported, Spoken, Unanswered
 
 __all__ = ["Summary"]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from sacbus.kernel import MS, SECOND
-from sacbus.monitor.entries import Lost
-from sacbus.monitor.summary import Summary
+from sacbus.watch.entries import Lost
+from sacbus.watch.summary import Summary
 from sacbus.wire import encode
-from tests.monitor.rig import M400, Rig
+from tests.watch.rig import M400, Rig
 
 
 def busy_line() -> Summary:

@@ -1,4 +1,4 @@
-"""The core of the monitor: bytes or transmissions with their times in, entries out.
+"""What is said on a line: bytes or transmissions with their times in, entries out.
 
 Owns what belongs together: an answer and its request, those who talked at the same time, a report
 and the transmission that it came of; and when it is certain that nothing more will come. Time is an
@@ -18,10 +18,10 @@ from typing import Final
 
 from sacbus.feed import Sent
 from sacbus.kernel import MS, SECOND, LineRate, Ns
-from sacbus.monitor.entries import Collision, Entry, Lost, Part, Reported, Spoken, Unanswered
-from sacbus.monitor.stream import Event, Stream, Stretch
-from sacbus.monitor.summary import Summary
 from sacbus.node import Protocol, Report
+from sacbus.watch.entries import Collision, Entry, Lost, Part, Reported, Spoken, Unanswered
+from sacbus.watch.stream import Event, Stream, Stretch
+from sacbus.watch.summary import Summary
 
 __all__ = ["FEED_SLACK", "LINK_SLACK", "Watch"]
 

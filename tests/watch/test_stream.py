@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from nodes.sac import KIND
 from sacbus.kernel import MS, LineRate
-from sacbus.monitor.stream import Stream, Stretch
+from sacbus.watch.stream import Stream, Stretch
 from sacbus.wire import encode
 from tests.bus.strategies import bursts
-from tests.monitor.rig import M400
+from tests.watch.rig import M400
 
 RATE = LineRate()
 

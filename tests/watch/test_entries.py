@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from sacbus.monitor.entries import (
+from sacbus.node import Report, ReportKind, Said
+from sacbus.watch.entries import (
     Collision,
     Entry,
     Lost,
@@ -15,7 +16,6 @@ from sacbus.monitor.entries import (
     concerns,
     is_fault,
 )
-from sacbus.node import Report, ReportKind, Said
 
 
 def packet(source: int, destination: int, verdict: str = "right") -> Spoken:

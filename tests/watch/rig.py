@@ -6,8 +6,8 @@ from nodes.sac import KIND, SacSettings
 from sacbus.bus import Bus, Port
 from sacbus.feed.server import sent_line
 from sacbus.kernel import MS, Kernel, Ns
-from sacbus.monitor.entries import Collision, Entry, Reported, Spoken, Unanswered
-from sacbus.monitor.watch import Watch
+from sacbus.watch.entries import Collision, Entry, Reported, Spoken, Unanswered
+from sacbus.watch.watch import Watch
 from sacbus.wire import encode
 
 __all__ = ["LINK", "M400", "Rig", "told"]
