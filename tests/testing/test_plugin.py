@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 # Loaded here, for pytester forgets what is first loaded within it, and numpy loads only once.
-import nodes.sac
+import nodes.sac  # noqa: F401
 import sacbus.testing.files
 import sacbus.testing.made  # noqa: F401
 
@@ -306,7 +306,7 @@ def test_a_failure_shows_the_last_packets_reports_and_states(pytester: pytest.Py
     result.stdout.fnmatch_lines(
         [
             '>       bus.expect(node=10, position=500, within="1 s")',
-            "E       *expected node 10: position 500 within 1 s, got position *, state CRUISE, at *",
+            "E  *expected node 10: position 500 within 1 s, got position *, state CRUISE, at *",
             "* sacbus: bus *",
             "at 1.0* s",
             "last on the line:",
