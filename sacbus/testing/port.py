@@ -57,6 +57,7 @@ class VirtualPort(serial.SerialBase):
 
     def read(self, size: int = 1) -> bytes:
         """``size`` bytes, or what came until the time was over."""
+        self._refuse_closed()
         timeout = inf if self.timeout is None else self.timeout
         limit = None if timeout == inf else self._kernel.now + round(timeout * SECOND)
         while self.in_waiting < size:
@@ -71,6 +72,7 @@ class VirtualPort(serial.SerialBase):
 
     def write(self, data: ReadableBuffer, /) -> int:
         """All of it, at once."""
+        self._refuse_closed()
         taken = bytes(data)
         while self._client.write(taken) < len(taken):  # the line is that far behind
             self._step(None)
@@ -97,6 +99,10 @@ class VirtualPort(serial.SerialBase):
             self.is_open = False
             self._client.close()
             self._seat.leave()
+
+    def _refuse_closed(self) -> None:
+        if not self.is_open:
+            raise serial.PortNotOpenError
 
     # Called by pyserial when its attributes are assigned.
 

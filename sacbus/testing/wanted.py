@@ -39,8 +39,8 @@ def wanted(
     scenario = Scenario(HERE, (bus,), (Step(expected),))
     findings = Findings(HERE, {})
     for one in complaints(scenario):
-        where = tuple(key for key in one.key.split(".") if key not in ("", "expect"))
-        findings.add(where, one.what, one.remedy)
+        rest = (key for key in one.key.split(".") if key not in ("", "expect"))
+        findings.add(("expect", *rest), one.what, one.remedy)
     _refuse(findings)
     return expected
 
