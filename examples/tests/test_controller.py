@@ -30,7 +30,7 @@ class Table:
             raise ValueError(f"axis {self._axis} has refused a packet")
 
     def shake(self, times: int) -> None:
-        """To and fro, with a rest in between."""
+        """There and back, with a rest in between."""
         for _ in range(times):
             for steps in 50, -50:
                 self.move(steps)

@@ -27,7 +27,7 @@ from sacbus.scenario.judges import judge
 from sacbus.scenario.quantity import nanoseconds
 from sacbus.scenario.tape import Tape
 from sacbus.testing.node import VirtualNode, state_words
-from sacbus.testing.wanted import Unmet, wanted
+from sacbus.testing.wanted import wanted
 from sacbus.trace import Track
 
 if TYPE_CHECKING:
@@ -270,7 +270,7 @@ class VirtualBus:
     def _settle(self, one: Expectation, got: str | None) -> None:
         __tracebackhide__ = True
         if got is not None:
-            raise Unmet(f"expected {one}, got {got}, at {self.instant}")
+            raise AssertionError(f"expected {one}, got {got}, at {self.instant}")
 
     def _outcome(
         self, ask: Callable[[Callable[[Acknowledged | Sent | MotherError], None]], None]
@@ -348,7 +348,7 @@ def _wake(woken: asyncio.Future[None]) -> None:
         woken.set_result(None)
 
 
-def _never(condition: Callable[[], object], within: str) -> Unmet:
+def _never(condition: Callable[[], object], within: str) -> AssertionError:
     name = getattr(condition, "__name__", "")
     what = "what is waited for" if name in ("", "<lambda>") else name
-    return Unmet(f"{what} did not come within {within}")
+    return AssertionError(f"{what} did not come within {within}")

@@ -18,14 +18,10 @@ from sacbus.scenario.rules import complaints
 from sacbus.scenario.steps import StepReader
 from sacbus.scenario.values import Scenario, Step
 
-__all__ = ["Unmet", "wanted"]
+__all__ = ["wanted"]
 
 #: What the mistakes of a call are told under, where a file has its name.
 HERE = "in this test"
-
-
-class Unmet(AssertionError):
-    """What was expected did not come; the text says what, what came, and when."""
 
 
 def wanted(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import unittest
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given, settings
@@ -72,7 +73,7 @@ def test_a_coroutine_can_be_run_in_a_test_that_is_none(bus: VirtualBus) -> None:
 
 @pytest.mark.asyncio
 async def test_what_would_move_time_behind_the_loop_is_refused(bus: VirtualBus) -> None:
-    refused = [
+    refused: list[Callable[[], object]] = [
         lambda: bus.run_for("1 s"),
         lambda: bus.sleep(1),
         lambda: bus.until(lambda: True, within="1 s"),
@@ -94,7 +95,7 @@ def test_a_loop_of_another_time_is_refused_at_once(bus: VirtualBus) -> None:
         bus.expected(node=10, position=0),
     ):
         with pytest.raises(RuntimeError, match="this loop is not in the bus's time"):
-            asyncio.run(coroutine)  # type: ignore[arg-type]
+            asyncio.run(coroutine)
 
 
 @pytest.mark.asyncio
@@ -270,7 +271,7 @@ class WithUnittest(unittest.TestCase):
         with virtual_bus(nodes="10-12", ustep=3) as bus:
             bus.send(10, "m2")
             bus.run_for("1 s")
-            self.assertEqual(bus.node(10).pulses, 16)
+            assert bus.node(10).pulses == 16
 
 
 @settings(max_examples=10)

@@ -105,6 +105,44 @@ def test_async_fixtures_share_the_time_whichever_comes_first(pytester: pytest.Py
     pytester.runpytest().assert_outcomes(passed=2)
 
 
+def test_a_project_may_have_a_bus_of_its_own_or_build_on_ours(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(
+        """
+        import pytest
+
+        @pytest.fixture
+        def bus(bus):
+            bus.run(bus.mother.send(10, "m40"))
+            bus.run_for("1 s")
+            return bus
+        """
+    )
+    pytester.makepyfile(
+        test_ours="""
+        import asyncio, pytest
+
+        @pytest.mark.asyncio
+        async def test_async(bus):
+            await asyncio.sleep(60)
+            assert bus.node(10).position == 40
+            assert bus.time() == pytest.approx(61, abs=0.1)
+        """,
+        test_theirs="""
+        import asyncio, pytest
+
+        @pytest.fixture
+        def bus():
+            return "number 9"
+
+        @pytest.mark.asyncio
+        async def test_async(bus):
+            assert bus == "number 9"
+            assert type(asyncio.get_running_loop()) is asyncio.SelectorEventLoop
+        """,
+    )
+    pytester.runpytest().assert_outcomes(passed=2)
+
+
 def test_auto_mode_needs_no_marker(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """
