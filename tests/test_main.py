@@ -11,7 +11,8 @@ import pytest
 from sacbus.cli import root
 from tests.serving import PATIENCE
 
-#: Presses Ctrl-C when the module of its first argument is looked for, or at the very end.
+#: Presses Ctrl-C when the module of its first argument is looked for (``dying``: while an object
+#: is cleared away there, as imports do), or at the very end.
 PRESSED = """
 import atexit, os, signal, sys
 from sacbus.__main__ import main
@@ -19,10 +20,17 @@ from sacbus.__main__ import main
 def press():
     os.kill(os.getpid(), signal.SIGINT)
 
+class Dying:
+    def __del__(self):
+        press()
+        moment  # where an exception would come, and be told of and dropped
+
 class Finder:
     def find_spec(self, name, path=None, target=None):
         if name == moment:
             press()
+        elif "dying " + name == moment:
+            Dying()
 
 moment = sys.argv.pop(1)
 sys.meta_path.insert(0, Finder())
@@ -59,7 +67,7 @@ def pressed(moment: str, *arguments: str, main: str = "{}") -> tuple[int, str, s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("module", ["click", "sacbus.config.notation", "sacbus.cli.serve"])
+@pytest.mark.parametrize("module", ["click", "sacbus.config.notation", "dying sacbus.cli.serve"])
 @pytest.mark.parametrize("command", sorted(root.commands))
 def test_ctrl_c_while_a_command_is_loaded_ends_it_with_130_and_no_word(
     command: str, module: str
