@@ -152,6 +152,11 @@ def low_byte(digits: str) -> int:
     return int(digits[-8:]) & 0xFF
 
 
+def quoted(line: str) -> str:
+    """How a line is quoted that people gave, who may give one of any length."""
+    return repr(line) if len(line) <= 60 else f"{line[:57]!r}…"
+
+
 def short(digits: str) -> str:
     """What is quoted of a number that may have thousands of digits."""
     return digits if len(digits) <= 20 else f"{digits[:17]}..."

@@ -20,6 +20,7 @@ from sacbus.fresh import fresh_file
 from sacbus.language import Defaults
 from sacbus.motion import Drive
 from sacbus.plan.entries import Commands, ListFile, PlanError, QueueFile, Source, Spool
+from sacbus.plan.picture_format import picture_format
 from sacbus.plan.pulses import PulseFormat, format_of, write_pulses
 from sacbus.plan.report import json_pieces, text_lines
 from sacbus.plan.sequence import Plan, Survey
@@ -134,6 +135,7 @@ def _drawing(place: str | None) -> Callable[[Plan, Survey, BinaryIO], None] | No
     """What draws in the format asked for; None when nothing is to be drawn."""
     if place is None:
         return None
+    form = picture_format(Path(place))
     try:
         # matplotlib is an extra, and takes longer to import than most plans to make.
         from sacbus.plan import picture  # noqa: PLC0415
@@ -142,7 +144,6 @@ def _drawing(place: str | None) -> Callable[[Plan, Survey, BinaryIO], None] | No
             f"drawing needs matplotlib ({fault}), --plot, "
             "install it: python -m pip install 'sacbus[plot]'"
         ) from fault
-    form = picture.picture_format(Path(place))
     return lambda plan, survey, file: picture.draw_plan(plan, survey, file, form)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import BinaryIO, Final
 
 import matplotlib as mpl
@@ -24,7 +23,7 @@ from sacbus.plan.entries import PlanError
 from sacbus.plan.report import seconds
 from sacbus.plan.sequence import Plan, Survey
 
-__all__ = ["SHADES", "draw_plan", "house_style", "picture_format", "save_figure"]
+__all__ = ["SHADES", "draw_plan", "house_style", "save_figure"]
 
 MOST_COMMANDS: Final = 5_000
 """More than a picture has columns of pixels for."""
@@ -35,19 +34,6 @@ SHADES: Final = {State.ACCEL: "#bfe3d3", State.CRUISE: "#d3e6f5", State.DECEL: "
 LINE: Final = "#1b2a41"
 CHARACTER: Final = 0.0072
 """Width of a character of a label, of the width of the plot."""
-
-FORMATS: Final = {".png": "png", ".svg": "svg"}
-
-
-def picture_format(path: Path) -> str:
-    """The format that a file's ending asks for; :class:`PlanError` for one that is not drawn."""
-    form = FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise PlanError(
-            f"pictures are drawn as PNG or SVG, {path}, give a name that ends in "
-            + " or ".join(FORMATS)
-        )
-    return form
 
 
 def draw_plan(plan: Plan, survey: Survey, file: BinaryIO, form: str) -> None:
