@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from functools import partial
 from random import Random
 
-from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, LivePort, Port
+from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, Fault, FaultOn, LivePort, Port
 from sacbus.configuration import Configuration, NodeAt
 from sacbus.console import Console
 from sacbus.host import Host, VirtualHost
@@ -73,6 +73,16 @@ class HostedBus:
     def panel(self, address: int) -> Panel:
         """A node's pins, encoder, switch and terminal; KeyError when there is no such node."""
         return self._panel(self.bus.node(address))
+
+    def fault(self, fault: Fault) -> FaultOn:
+        """Put a fault on the line now; what is given counts it and takes it :meth:`off`.
+
+        FaultError where this bus cannot have it.
+        """
+        self.now()
+        on = self.bus.medium.add_fault(fault, self.host.arrive)
+        self.now()  # the host sees to what it wants next
+        return on
 
     def terminal(self, address: int) -> Console:
         """The terminal of a node, to type at and to read; KeyError when there is none.

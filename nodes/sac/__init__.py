@@ -20,7 +20,7 @@ class SacKind:
     """The entry point ``sac`` of the group ``sacbus.nodes``."""
 
     name = "sac"
-    summary = "SAC single-axis stepper controller, network port"
+    summary = "SAC single-axis stepper controller"
     protocol = SAC_PROTOCOL
     settings = SacSettings
 

@@ -309,7 +309,7 @@ class CommandProcessor:
         lost = self.queue.add(motion)
         if lost is not None:
             self._told.tell_of_command(
-                ReportKind.OVERRUN, f"31 commands pending: queue position {lost} overwritten"
+                ReportKind.OVERRUN, f"queue position {lost} overwritten, which was pending"
             )
         if self._run.idle:
             self._load_next(now)

@@ -68,15 +68,17 @@ class Queue:
     def add(self, motion: Motion) -> int | None:
         """Put a command into the next position and let it wait for its turn.
 
-        The 31st that waits takes the place of the oldest, which is lost: its position; else None.
+        One that waits there already is lost, as the oldest is when the 31st comes: the new one
+        takes its place and its turn. Returns that position, else None.
         """
         position = self.next_free
-        full = len(self.pending) >= QUEUE_LENGTH
-        if not full:
+        # Not only while 30 wait: once the 31st has come, the next one meets the oldest as well.
+        lost = position in self.pending
+        if not lost:
             self.pending.append(position)
         self._write(position, motion, waits=True)
         self.next_free = position % QUEUE_LENGTH + 1
-        return position if full else None
+        return position if lost else None
 
     def write(self, position: int, motion: Motion) -> None:
         """Put a command into a position, 1 to 30; what waits, and in which order, stays."""
@@ -85,9 +87,9 @@ class Queue:
     def put_back(self, position: int) -> bool:
         """Let a command that was taken from the head wait again; False when it was overwritten.
 
-        That is when 30 others wait already.
+        That is when another waits in its position.
         """
-        if len(self.pending) >= QUEUE_LENGTH:
+        if position in self.pending:
             return False
         self.pending.insert(0, position)
         return True

@@ -142,6 +142,27 @@ class _Routes:
                 self._see_if_open(seat)
                 self._appoint(seat)
 
+    def address_of(self, sender: object) -> int | None:
+        for seat in self.seats:
+            if seat.node is sender:
+                return seat.node.address
+        return None
+
+    def node_at(self, address: int) -> object | None:
+        seats = self._by_address.get(address)
+        return seats[0].node if seats else None
+
+    def deliver_to(
+        self, heard: Heard, sender: object, now: Ns, wanted: Callable[[int], bool]
+    ) -> None:
+        addresses = self._addressed(heard.data)
+        chosen = self.seats if addresses is None else self._several(addresses, self._open)
+        for seat in chosen:
+            if seat.node is not sender and wanted(seat.address):
+                seat.node.hear(heard, now)
+                self._see_if_open(seat)
+                self._appoint(seat)
+
     def deliver(self, heard: Heard, sender: object, now: Ns) -> None:
         addresses = self._addressed(heard.data)
         if addresses is None:

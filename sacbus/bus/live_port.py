@@ -42,7 +42,10 @@ class LivePort:
 
     def begun(self, sent: Transmission) -> None:
         """The medium's side: somebody here begins to talk."""
-        self._send(sent.data)
+        passage = sent.passage
+        data = sent.data if passage is None else bytes(passage.values)
+        if data:
+            self._send(data)
 
     def talk(self, data: bytes) -> None:
         """Bytes that have come over the real line."""

@@ -13,53 +13,25 @@ everything, frame by frame. Everyone is handed bytes with their times.
 Two transmissions that overlap on a lane collide: every byte that was touched arrives as another
 value, in both, and both are counted. What had arrived before the overlap had arrived.
 
-Faults (bit errors, noise, a cut line) will act in :meth:`Medium._arrive`, where a transmission
-becomes what is heard.
+Faults strike a transmission as it begins (:mod:`sacbus.bus.fault`). One that they leave alone goes
+the way above; what they touch goes another, as a :class:`~sacbus.bus.passage.Passage`, in pieces.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol as Contract
+from functools import partial
+from operator import eq
 
+from sacbus.bus.around import Listener, Router, Tap
+from sacbus.bus.fault import Fault, FaultOn
+from sacbus.bus.passage import EVERY_LINK, Passage
 from sacbus.bus.transmission import Transmission
 from sacbus.kernel import Kernel, LineRate, Ns
 from sacbus.node import Heard
 
-__all__ = ["LaneCounters", "Listener", "Medium", "Router", "Tap"]
-
-
-class Listener(Contract):
-    """Whoever hears all bytes of a lane, bytes of overlapped transmissions included."""
-
-    def hear(self, heard: Heard, now: Ns) -> None:
-        """Some bytes have arrived; called in the order of their last bytes."""
-        ...
-
-
-class Tap(Contract):
-    """Whoever must know of a transmission when it begins: a line that goes on outside."""
-
-    def begun(self, sent: Transmission) -> None:
-        """``sent`` begins now. What will overlap it is not known yet."""
-        ...
-
-
-class Router(Contract):
-    """Who must hear what, as the bus knows it."""
-
-    def cuts(self, data: bytes) -> Sequence[int]:
-        """Offsets before the end at which a node may have to act."""
-        ...
-
-    def deliver(self, heard: Heard, sender: object, now: Ns) -> None:
-        """Hand some bytes to the nodes that they concern."""
-        ...
-
-    def concerns(self, data: bytes) -> bool:
-        """Whether any node would be handed this if it arrived next."""
-        ...
+__all__ = ["LaneCounters", "Medium"]
 
 
 @dataclass(slots=True)
@@ -106,6 +78,11 @@ class Medium:
         #: Called with each transmission when it is over; for traces and live displays.
         self.watchers: list[Callable[[Transmission], None]] = []
         self._taps: list[tuple[object, Tap]] = []
+        #: The faults that are on, in the order in which they were put on; and how many ever were.
+        self.faults: list[FaultOn] = []
+        self._faults_ever = 0
+        #: Called with each fault after it was put on, and after it was taken off.
+        self.fault_watchers: list[Callable[[FaultOn], None]] = []
 
     @property
     def lanes(self) -> int:
@@ -149,6 +126,33 @@ class Medium:
         """Forget a tap; nothing happens if it was not there."""
         self._taps = [entry for entry in self._taps if entry[1] is not tap]
 
+    def add_fault(
+        self,
+        fault: Fault,
+        through: Callable[[Callable[[], object]], object] = lambda act: act(),
+    ) -> FaultOn:
+        """Put a fault on the line now; :meth:`FaultOn.off` takes it off.
+
+        ``through`` brings bus time up to date before it does what it is given; without it, whoever
+        puts faults on and off does so in bus time.
+        """
+        on = FaultOn(fault, self, self._faults_ever, through)
+        self._faults_ever += 1
+        self.faults = [*self.faults, on]
+        for watcher in self.fault_watchers:
+            watcher(on)
+        return on
+
+    def drop_fault(self, on: FaultOn) -> None:
+        """What :meth:`FaultOn.off` does; what has begun ends as it began."""
+        self.faults = [one for one in self.faults if one is not on]
+        for watcher in self.fault_watchers:
+            watcher(on)
+
+    def node_at(self, address: int) -> object | None:
+        """The first node with that address; None without one."""
+        return self._router.node_at(address)
+
     def transmit(
         self, sender: object, data: bytes, lane: int, ninth: bytes | None = None
     ) -> Transmission:
@@ -162,6 +166,8 @@ class Medium:
         end = now + span
         self._sent += 1
         sent = Transmission(self._sent, sender, lane, now, data, self.rate, end, cuts, ninth)
+        if self.faults and self._struck(sent):
+            return sent
         counters = place.counters
         counters.transmissions += 1
         counters.bytes += size
@@ -197,6 +203,8 @@ class Medium:
         cuts = self._router.cuts(data) if lane == 0 else ()
         self._sent += 1
         sent = Transmission(self._sent, sender, lane, start, data, self.rate, start + span, cuts)
+        if self.faults and self._struck(sent, collides=False):
+            return sent
         place.counters.transmissions += 1
         place.counters.bytes += len(data)
         place.counters.busy += span
@@ -264,6 +272,129 @@ class Medium:
             self.kernel.at(sent.start + self.rate.span(cuts[step]), self._arrive, sent)
         elif self._rest_matters(place, sent, upto):
             self.kernel.at(sent.end, self._arrive, sent)
+
+    # ---- under faults ----
+
+    def _struck(self, sent: Transmission, *, collides: bool = True) -> bool:
+        """Let the faults strike what begins; False if none of them did: then nothing has happened.
+
+        Otherwise it is on its way, to arrive in pieces.
+        """
+        passage = Passage(sent, self._router.address_of)
+        for on in self.faults:
+            if on.strike is not None:
+                on.strike(passage)
+        if not passage.concerns:
+            return False
+        sent.passage = passage
+        if passage.end is not None:
+            sent.end = passage.end
+        if not passage.silent:
+            pieces = passage.pieces()
+            if pieces:
+                # The line is taken until the last byte has arrived, however late it is.
+                sent.end = max(sent.end, pieces[-1].end)
+            self._occupy(sent, passage, collides=collides)
+            for piece in pieces:
+                self._send_piece(piece, passage, passage.reaches)
+            for address, rate in passage.receivers.items():
+                for piece in passage.as_read_at(rate).pieces(rate):
+                    self._send_piece(piece, passage, partial(eq, address))
+            if self._taps and passage.reaches(EVERY_LINK):
+                self._begin(sent)
+        if not passage.left:
+            self.kernel.at(sent.end, self._end, sent)
+        return True
+
+    def _occupy(self, sent: Transmission, passage: Passage, *, collides: bool) -> None:
+        """Take the lane for as long as it lasts, from all on the same side of every cut."""
+        place = self._lanes[sent.lane]
+        counters = place.counters
+        counters.transmissions += 1
+        counters.bytes += len(sent.data)
+        counters.busy += sent.end - sent.start
+        if collides:
+            place.active = [other for other in place.active if other.end > sent.start]
+            for other in place.active:
+                if other.passage is None or other.passage.side == passage.side:
+                    end = min(sent.end, other.end)
+                    for one in (other, sent):
+                        counters.collided += one.hit(sent.start, end)
+            place.active.append(sent)
+        # What is behind a cut keeps nobody before it waiting.
+        if not any(passage.side):
+            place.free_at = max(sent.end, place.free_at or 0)
+
+    def _send_piece(
+        self, piece: Transmission, passage: Passage, reaches: Callable[[int | None], bool]
+    ) -> None:
+        piece.cuts = self._router.cuts(piece.data) if piece.lane == 0 else ()
+        passage.left += 1
+        self._appoint_piece(piece, passage, reaches)
+
+    def _appoint_piece(
+        self, piece: Transmission, passage: Passage, reaches: Callable[[int | None], bool]
+    ) -> None:
+        """Have the piece arrive up to its next cut, or to its end."""
+        end = piece.end
+        if piece.step < len(piece.cuts):
+            end = piece.start + piece.rate.span(piece.cuts[piece.step])
+        self.kernel.at(end, self._arrive_piece, piece, passage, reaches)
+
+    def _arrive_piece(
+        self, piece: Transmission, passage: Passage, reaches: Callable[[int | None], bool]
+    ) -> None:
+        """As :meth:`_arrive`, for one piece and those whom it reaches."""
+        now = self.kernel.now
+        sent = passage.sent
+        # What overlapped the whole overlapped its pieces.
+        piece.hits = sent.hits
+        cuts, step, size = piece.cuts, piece.step, len(piece.data)
+        upto = cuts[step] if step < len(cuts) else size
+        if piece.lane == 0:
+            heard = self._heard(piece, piece.to_nodes, upto)
+            self._router.deliver_to(heard, piece.sender, now, reaches)
+        piece.to_nodes = upto
+        whole = upto == size or (step < len(cuts) - 1 and cuts[step + 1] > upto + 1)
+        listeners = self._lanes[piece.lane].listeners
+        if whole and listeners and reaches(EVERY_LINK):
+            heard = self._heard(piece, piece.to_listeners, upto)
+            piece.to_listeners = upto
+            for owner, listener in listeners:
+                if owner is not piece.sender or (passage.echoes and passage.echoes(listener)):
+                    late = passage.late(listener) if passage.late else 0
+                    if late:
+                        self.kernel.at(now + late, self._give, piece.lane, listener, heard)
+                    else:
+                        listener.hear(heard, now)
+        if upto < size:
+            piece.step += 1
+            self._appoint_piece(piece, passage, reaches)
+            return
+        passage.left -= 1
+        if not passage.left:
+            # Later than the last piece when the end of it was lost.
+            self.kernel.at(sent.end, self._end, sent)
+
+    def _give(self, lane: int, listener: Listener, heard: Heard) -> None:
+        """Hand on what came late, unless the listener has left."""
+        if any(one is listener for _, one in self._lanes[lane].listeners):
+            listener.hear(heard, self.kernel.now)
+
+    def _heard(self, piece: Transmission, first: int, upto: int) -> Heard:
+        return Heard(
+            self._spoilt(piece, first, upto),
+            piece.start,
+            first,
+            piece.rate,
+            piece.data[upto:],
+            piece.ninth_bits(first, upto, self.seed),
+        )
+
+    def _end(self, sent: Transmission) -> None:
+        """What faults had touched is over."""
+        for watcher in self.watchers:
+            watcher(sent)
 
     def _spoilt(self, sent: Transmission, first: int, last: int) -> bytes:
         return sent.arrived(first, last, self.seed)

@@ -6,9 +6,13 @@ Owns the bytes on the wire and which of them were hit when transmissions overlap
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 from zlib import crc32
 
 from sacbus.kernel import LineRate, Ns
+
+if TYPE_CHECKING:
+    from sacbus.bus.passage import Passage
 
 __all__ = ["Transmission"]
 
@@ -33,6 +37,7 @@ class Transmission:
         "lane",
         "ninth",
         "number",
+        "passage",
         "rate",
         "sender",
         "start",
@@ -66,6 +71,8 @@ class Transmission:
         self.to_nodes = 0
         self.to_listeners = 0
         self.hits: list[tuple[Ns, Ns]] | None = None
+        #: What faults made of it; None where none touched it.
+        self.passage: Passage | None = None
         #: What arrived, once hits have touched it, and how many bytes of that are settled.
         self._wire: bytearray | None = None
         self._settled = 0
@@ -82,6 +89,26 @@ class Transmission:
             return True
         self.hits.append((begin, end))
         return False
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """The names of the faults that acted on it; none on nearly all."""
+        return () if self.passage is None else self.passage.by
+
+    def outcome(self, seed: int) -> bytes:
+        """All that arrived of it where nothing but the line was between, once it is over.
+
+        Where faults kept it from somebody, :attr:`passage` knows from whom.
+        """
+        if self.passage is None:
+            return self.arrived(0, len(self.data), seed)
+        return self.passage.outcome(seed)
+
+    def outcome_ninth(self, seed: int) -> bytes | None:
+        """The ninth bits that belong to :meth:`outcome`; None where none were sent."""
+        if self.passage is None:
+            return self.ninth_bits(0, len(self.data), seed)
+        return self.passage.outcome_ninth(seed)
 
     def arrived(self, first: int, last: int, seed: int) -> bytes:
         """What arrived of bytes ``first`` to ``last`` (exclusive), all of which have ended by now.

@@ -67,7 +67,8 @@ class Sent:
 
     ``sender`` in words; ``node`` its address if it is a node of this bus. ``data`` is what arrived.
     ``hits``: from when to when others talked over it. ``ninth``: a 0 or 1 for each byte where it
-    was sent with ninth bits.
+    was sent with ninth bits. ``faults``: names of those that acted on it; then ``sent`` is what was
+    sent, nothing of which need have arrived.
     """
 
     start: Ns
@@ -78,6 +79,8 @@ class Sent:
     data: bytes
     hits: tuple[tuple[Ns, Ns], ...] = ()
     ninth: bytes | None = None
+    faults: tuple[str, ...] = ()
+    sent: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +169,10 @@ def _sent(line: Sent) -> dict[str, object]:
         fields["hits_ns"] = line.hits
     if line.ninth is not None:
         fields["ninth"] = "".join("1" if bit else "0" for bit in line.ninth)
+    if line.faults:
+        fields["faults"] = line.faults
+    if line.sent is not None:
+        fields["sent"] = line.sent.hex()
     return fields
 
 
@@ -192,7 +199,7 @@ def _line(event: str, fields: dict[str, Any]) -> Line | None:
     """``Any``: whatever JSON holds; :func:`decode` takes what that may raise here."""
     match event:
         case "transmission":
-            ninth = fields.get("ninth")
+            ninth, sent = fields.get("ninth"), fields.get("sent")
             return Sent(
                 fields["start_ns"],
                 fields["end_ns"],
@@ -202,6 +209,8 @@ def _line(event: str, fields: dict[str, Any]) -> Line | None:
                 bytes.fromhex(fields["data"]),
                 tuple((begin, end) for begin, end in fields.get("hits_ns", ())),
                 None if ninth is None else bytes(bit == "1" for bit in ninth),
+                tuple(str(fault) for fault in fields.get("faults", ())),
+                None if sent is None else bytes.fromhex(sent),
             )
         case "report":
             return Report(

@@ -19,7 +19,7 @@ from typing import Final
 from typing import Protocol as Contract
 
 from sacbus import __version__
-from sacbus.bus import Bus, LivePort, Port, Transmission
+from sacbus.bus import Bus, FaultOn, LivePort, Port, Transmission
 from sacbus.feed.lines import Hello, Line, Missed, Reached, Sent, Stopped, Way, encode
 from sacbus.feed.places import SUFFIX, private_directory, remove_stale
 from sacbus.host import Host
@@ -284,7 +284,7 @@ class _Client(asyncio.Protocol):
 
 def sent_line(sent: Transmission, bus: Bus) -> Sent:
     """What is told of a transmission on this bus that is over."""
-    size, seed = len(sent.data), bus.medium.seed
+    seed = bus.medium.seed
     sender, node = _sender(sent.sender, bus)
     return Sent(
         sent.start,
@@ -292,15 +292,17 @@ def sent_line(sent: Transmission, bus: Bus) -> Sent:
         sent.lane,
         sender,
         node,
-        sent.arrived(0, size, seed),
+        sent.outcome(seed),
         tuple(sent.hits or ()),
-        sent.ninth_bits(0, size, seed),
+        sent.outcome_ninth(seed),
+        sent.faults,
+        sent.data if sent.faults else None,
     )
 
 
 def _sender(sender: object, bus: Bus) -> tuple[str, int | None]:
     """In words, and the address if it is a node."""
-    if isinstance(sender, Port | LivePort):
+    if isinstance(sender, Port | LivePort | FaultOn):
         return sender.name, None
     for node in bus.nodes:
         if node is sender:

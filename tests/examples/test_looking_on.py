@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,6 +23,9 @@ pytestmark = pytest.mark.slow
 def runtime(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     with runtime_directory() as directory:
         monkeypatch.setenv("XDG_RUNTIME_DIR", str(directory))
+        # Else it looks among the user's own buses as well, and there may be some.
+        monkeypatch.setenv("TMPDIR", str(directory))
+        monkeypatch.setattr(tempfile, "tempdir", str(directory))
         yield directory
 
 

@@ -37,6 +37,8 @@ lines: st.SearchStrategy[Line] = st.one_of(
         st.binary(),
         st.lists(st.tuples(times, times)).map(tuple),
         st.none() | st.lists(st.integers(0, 1)).map(bytes),
+        st.lists(st.text()).map(tuple),
+        st.none() | st.binary(),
     ),
     st.builds(
         Report,
@@ -76,6 +78,9 @@ def test_a_transmission_is_told_as_documented() -> None:
     hit = encode(Sent(5, 9, 0, "/run/sac", None, b"\x41", ((6, 7),), b"\1"), "bench")
     fields = json.loads(hit)
     assert (fields["collided"], fields["hits_ns"], fields["ninth"]) == (True, [[6, 7]], "1")
+    lost = encode(Sent(5, 9, 0, "a", None, b"", faults=("drop", "delay"), sent=b"\x41"), "bench")
+    fields = json.loads(lost)
+    assert (fields["data"], fields["sent"], fields["faults"]) == ("", "41", ["drop", "delay"])
 
 
 def test_a_report_is_told_as_serve_prints_it() -> None:

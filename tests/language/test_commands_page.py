@@ -1,7 +1,10 @@
-"""docs/commands.md against the grammar: no command is missing there, and no example is wrong."""
+"""docs/commands.md against the grammar and the tests: no command is missing there, no example is
+wrong, and no row is without a test that exists.
+"""
 
 from __future__ import annotations
 
+import ast
 import re
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -25,7 +28,8 @@ from sacbus.language.readers.loops import LOOP_LETTERS, REFERENCE_LETTERS
 from sacbus.language.readers.queue import QUEUE_LETTERS
 from sacbus.language.readers.system import SYSTEM_LETTERS
 
-PAGE = Path(__file__).parents[2] / "docs" / "commands.md"
+TESTS = Path(__file__).parents[1]
+PAGE = TESTS.parent / "docs" / "commands.md"
 MODES = {
     "queue": [Mode.QUEUE],
     "references": [Mode.REFERENCES],
@@ -67,6 +71,18 @@ EXAMPLES: Final = [example for row in ROWS for example in row.examples]
 AT_PROMPT: Final = [line for mode, line in EXAMPLES if mode is Mode.PROMPT]
 
 
+def named_in(text: str) -> list[tuple[str, str]]:
+    """File, relative to tests/nodes/sac unless a room is named, and name of each test."""
+    return re.findall(r"`([\w/]+\.py)::(test_\w+)`", text)
+
+
+def written_in(file: str) -> set[str]:
+    """Names of the tests in a file that the page names."""
+    path = TESTS / file if "/" in file else TESTS / "nodes" / "sac" / file
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
 def described(mode: Mode, line: str) -> tuple[Command, set[str]]:
     """An example's command, and those of its fields that the line gives."""
     parsed = parse_in(mode, line)
@@ -94,6 +110,20 @@ def test_every_row_has_an_example_and_the_same_columns() -> None:
             "test",
             "decision",
         ]
+
+
+def test_every_row_has_a_test_and_nothing_else_in_its_place() -> None:
+    for row in ROWS:
+        cell = row.cells["test"]
+        assert named_in(cell), f"no test proves {row.cells['syntax']}"
+        assert len(named_in(cell)) == len(cell.split("<br>"))
+
+
+def test_every_test_that_the_page_names_exists() -> None:
+    named = named_in(PAGE.read_text(encoding="utf-8"))
+    assert PAGE.read_text(encoding="utf-8").count("::") == len(named)
+    for file, name in named:
+        assert name in written_in(file), f"docs/commands.md names {file}::{name}: there is none"
 
 
 @pytest.mark.parametrize(("mode", "line"), EXAMPLES)

@@ -9,6 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nodes.sac import KIND
+from sacbus.bus import (
+    BitErrors,
+    Dead,
+    Delay,
+    Drop,
+    Duplicate,
+    Fault,
+    LateDirection,
+    WrongBaud,
+)
 from sacbus.feed import Sent
 from sacbus.kernel import MS, SECOND, LineRate, Ns
 from sacbus.monitor.entries import Collision, Entry, Lost, Reported, Spoken, Unanswered
@@ -461,3 +471,45 @@ def test_load_counts_the_time_in_which_anybody_talks_once(lanes: int) -> None:
     rig.stranger_says(b"\x55" * 10, at=MS)
     rig.run()
     assert rig.watch.summary.busy == (MS + TEN_BYTES) // lanes
+
+
+# ------------------------------------------------------------------------------- faults
+
+
+@pytest.mark.parametrize(
+    ("fault", "expected"),
+    [
+        (Dead(10), ["packet 1>10", "no answer 1>10"]),
+        (Drop(1), []),
+        (BitErrors(1), ["garbage"]),
+        (LateDirection(MS), ["packet 1>10", "garbage", "no answer 1>10"]),
+    ],
+)
+def test_what_arrived_is_told_and_what_did_not_is_not(fault: Fault, expected: list[str]) -> None:
+    rig = Rig(10)
+    rig.bus.medium.add_fault(fault)
+    rig.says(M400, at=5 * MS)
+    assert told(rig.run()) == expected
+
+
+@pytest.mark.slow
+@given(
+    st.lists(
+        st.sampled_from(
+            (BitErrors(0.02), Drop(0.1), Duplicate(0.1), Delay(0.1, MS), WrongBaud(10, 9_600))
+        ),
+        min_size=1,
+    ),
+    st.lists(bursts, max_size=6),
+)
+def test_whatever_faults_do_to_a_line_each_entry_ends_after_it_began(
+    faults: list[Fault], talk: list[bytes]
+) -> None:
+    rig = Rig(10, 11)
+    for fault in faults:
+        rig.bus.medium.add_fault(fault)
+    for number, data in enumerate(talk):
+        rig.says(data, at=number * 3 * MS)
+    for entry in rig.run(SECOND):
+        if isinstance(entry, Spoken):
+            assert entry.start <= entry.end

@@ -181,6 +181,14 @@ def test_a_start_wait_runs_after_loading(wait_us: int) -> None:
     assert bench.position(start) == 1
 
 
+@pytest.mark.parametrize("cycle_us", [42_567, 30_001, 2_500])
+def test_a_cycle_is_the_time_of_a_step(cycle_us: int) -> None:
+    bench = Bench()
+    bench.hears(f"m5vc{cycle_us}a999d999", at=AT)
+    times = pulse_times(bench, AT, AT + LOAD_ACC + 5 * cycle_us * US)
+    assert periods(times) == [cycle_us * US] * 4
+
+
 def test_velocity_and_ramps_of_a_command_become_the_session_defaults_and_nothing_else_does() -> (
     None
 ):

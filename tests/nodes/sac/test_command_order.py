@@ -185,6 +185,13 @@ def test_a_counted_loop_ends_by_itself_and_the_count_is_gone() -> None:
     assert len(line.run(at_most=SECOND)) > 12
 
 
+@pytest.mark.parametrize("count", ["ln", "ln0"])
+def test_a_count_of_none_is_for_ever(count: str) -> None:
+    line = filled()
+    line.says("ln2", count, "ls1", "lf2")
+    assert line.run(at_most=SECOND)[:8] == [1, 2] * 4
+
+
 def test_la_loops_over_the_whole_queue_from_one() -> None:
     line = filled()
     line.says("ln1", "la")

@@ -45,6 +45,31 @@ def test_the_31st_that_waits_takes_the_place_of_the_oldest_and_its_turn() -> Non
     assert queue.next_free == 2
 
 
+def test_what_comes_behind_the_31st_goes_on_overwriting_and_runs_once() -> None:
+    queue = Queue(Defaults())
+    for number in range(1, 32):
+        queue.add(motion(number))
+    queue.pending.pop(0)
+    assert queue.add(motion(32)) == 2
+    assert queue.pending == [*range(2, 31)]
+    assert [one.steps for one in queue.waiting()] == [32, *range(3, 31)]
+    held = queue.pending.pop(0)
+    assert queue.next_free == 3
+    assert queue.put_back(held)
+
+
+def test_a_held_command_that_was_overwritten_by_what_came_behind_the_31st_is_not_put_back() -> None:
+    queue = Queue(Defaults())
+    for number in range(1, 32):
+        queue.add(motion(number))
+    queue.pending.pop(0)
+    held = queue.pending.pop(0)
+    queue.add(motion(32))
+    assert queue.pending == [*range(3, 31), held]
+    assert not queue.put_back(held)
+    assert queue.pending == [*range(3, 31), held]
+
+
 def test_an_edit_makes_nothing_pending_and_moves_no_pointer() -> None:
     queue = Queue(Defaults())
     queue.write(9, motion(5))

@@ -151,6 +151,7 @@ def test_full_steps_and_pulses(desk: Desk) -> None:
     assert desk.runs("m5")[1] == 20
     desk.hears("$P")
     assert desk.runs("m5")[1] == 5
+    assert [desk.runs(line)[1] for line in ("m5f", "m5p", "m5")] == [20, 5, 5]
     desk.hears("$U")
     assert desk.runs("m5")[1] == 20
     desk.hears("$U")
@@ -167,8 +168,9 @@ def test_what_is_sent_has_no_crc_until_the_reboot(desk: Desk) -> None:
     assert desk.answered(line)[-1] == bare
     desk.hears("$R")
     assert desk.answered(line)[-1] == sent
-    desk.hears("$H0", "$H")
-    assert desk.answered(line)[-1] == sent
+    for on in ("$H", "$H1", "$H7"):
+        desk.hears("$H0", on)
+        assert desk.answered(line)[-1] == sent
 
 
 def test_a_crc_that_comes_is_checked_all_the_same(desk: Desk) -> None:
@@ -187,9 +189,10 @@ def test_answers_are_off_until_the_reboot_but_the_line_that_said_so_has_one(desk
     assert desk.answered("m1") == []
     assert desk.answered("$R") == []
     assert desk.answered("m1") == acked
-    assert desk.answered("$K0") == acked
-    assert desk.answered("$K") == []
-    assert desk.answered("m1") == acked
+    for on in ("$K", "$K1", "$K7"):
+        assert desk.answered("$K0") == acked
+        assert desk.answered(on) == []
+        assert desk.answered("m1") == acked
 
 
 def test_a_ramp_comes_with_its_own_defaults_until_the_reboot(desk: Desk) -> None:

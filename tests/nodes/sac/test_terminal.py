@@ -15,57 +15,20 @@ from nodes.sac.boot import VERSION_LINE
 from sacbus.kernel import MS, SECOND
 from sacbus.language import Mode, ShowQueue, ShowSession
 from sacbus.language.queue_file import write_rows
-from sacbus.language.queue_screen import QueueScreen
 from sacbus.node import ReportKind, Terminal
 from sacbus.wire import GENERAL_CALL, ack
 from tests.language.strategies import nearly_commands
 from tests.nodes.sac.bench import NODE, Bench, packet
+from tests.nodes.sac.console import Console, lines
 
 DATA = Path(__file__).parents[2] / "data"
 
 Vector = dict[str, Any]  # parsed JSON: its values are of any type
 
 
-class Console:
-    """A bench with somebody at the terminal of its first node."""
-
-    def __init__(self, *addresses: int) -> None:
-        self.bench = Bench(*addresses)
-        self.terminal = self.bench.node.terminal
-        self.shown = bytearray()
-        self.terminal.show = self.shown.extend
-
-    def types(self, keys: str | bytes) -> str:
-        """What is shown from here on, once the line has come to rest for 20 ms."""
-        begin = len(self.shown)
-        bench = self.bench
-        keys = keys.encode("latin-1") if isinstance(keys, str) else keys
-        self.terminal.type(keys, bench.kernel.now)
-        bench.bus.touch(bench.node)
-        bench.kernel.run_until(bench.kernel.now + 20 * MS)
-        return self.shown[begin:].decode("latin-1")
-
-    @property
-    def mode(self) -> Mode:
-        """The mode that the terminal is in."""
-        terminal = self.bench.node._terminal
-        assert terminal is not None
-        return terminal.mode
-
-    def queue(self) -> QueueScreen:
-        screen = QueueScreen.read(self.types("q\r"))
-        assert screen is not None
-        return screen
-
-
 @pytest.fixture
 def console() -> Console:
     return Console()
-
-
-def lines(*parts: str) -> str:
-    """Lines, each with its end, and the prompt."""
-    return "".join(part + "\r\n" for part in parts) + "SAC>"
 
 
 # ---- lines, echo, prompt ------------------------------------------------------------------------
@@ -233,6 +196,28 @@ def test_the_configure_screen_is_entered_and_left(console: Console) -> None:
     assert screen.endswith("\r\nN r_id         0      n sw            38400\r\nSAC>")
     assert console.types("X\r") == lines("X")
     assert console.types("cc\r")[2:] == screen[2:]
+
+
+MODES = [("qp", Mode.QUEUE), ("xp", Mode.REFERENCES), ("$C", Mode.CONFIGURE)]
+
+
+@pytest.mark.parametrize(("opens", "mode"), MODES)
+def test_s_stops_the_motor_in_every_mode_and_an_empty_line_does_nothing(
+    console: Console, opens: str, mode: Mode
+) -> None:
+    bench = console.bench
+    console.types(f"{opens}\r")
+    for line, state in (("S", "STANDBY"), ("s", "DECEL")):
+        bench.hears("m", at=bench.kernel.now + SECOND)
+        console.until(bench.kernel.now + 5 * SECOND)
+        assert console.types("\r") == lines("")
+        assert bench.snapshot(bench.kernel.now).state == "CRUISE"
+        assert console.types(f"{line}\r") == lines(line)
+        assert bench.snapshot(bench.kernel.now).state == state
+    assert console.mode is mode
+    assert console.types("x\r") == lines("x")
+    assert console.mode is Mode.PROMPT
+    assert bench.told() == []
 
 
 def test_system_commands_that_show_something_end_all_motion(console: Console) -> None:

@@ -1,0 +1,71 @@
+"""A bus that runs: faults in the hands of who hosts it, in virtual time and in real time."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from sacbus.bus import Babble, Dead, Drop, FaultError
+from sacbus.daemon import Configuration, HostedBus, open_bus
+from sacbus.host import run_virtual
+from sacbus.kernel import MS, Kernel
+from sacbus.mother import MotherError
+from sacbus.selector import real_loop
+
+
+async def _lose_and_find(bus: HostedBus) -> None:
+    """Nobody answers while a fault is on, and everybody does before and after."""
+    mother = bus.mother()
+    await mother.send(10, "v100")
+    on = bus.fault(Dead(10))
+    with pytest.raises(MotherError):
+        await mother.send(10, "v100")
+    assert on.count == 3
+    on.off()
+    await mother.send(10, "v100")
+    assert on.count == 3
+
+
+async def _scene() -> None:
+    async with open_bus(Configuration(nodes=(10,))) as bus:
+        await _lose_and_find(bus)
+
+
+def test_a_fault_is_put_on_and_taken_off_in_virtual_time() -> None:
+    run_virtual(Kernel(), _scene())
+
+
+def test_a_fault_is_put_on_and_taken_off_in_real_time() -> None:
+    with asyncio.Runner(loop_factory=real_loop) as runner:
+        runner.run(_scene())
+
+
+@pytest.mark.slow
+def test_what_a_fault_wants_to_say_by_itself_is_said_in_real_time() -> None:
+    async def main() -> None:
+        async with open_bus(Configuration(nodes=(10,))) as bus:
+            thrice = asyncio.Event()
+
+            def seen(_sent: object) -> None:
+                if on.count == 3:
+                    thrice.set()
+
+            bus.bus.medium.watchers.append(seen)
+            on = bus.fault(Babble(b"A", 5 * MS))
+            async with asyncio.timeout(20):
+                await thrice.wait()
+            on.off()
+
+    with asyncio.Runner(loop_factory=real_loop) as runner:
+        runner.run(main())
+
+
+def test_a_fault_that_the_bus_cannot_have_is_refused() -> None:
+    async def main() -> None:
+        async with open_bus(Configuration(nodes=(10,))) as bus:
+            with pytest.raises(FaultError, match="the address of a node on this bus, got 11"):
+                bus.fault(Babble(b"A", MS, node=11))
+            assert bus.fault(Drop(1)).since == bus.now()
+
+    run_virtual(Kernel(), main())
