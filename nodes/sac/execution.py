@@ -127,7 +127,7 @@ class Execution:
             self.tells_ops = on
             self._untold = on and self.waits(now)
 
-    def reboot(self, drive: Drive, defaults: Defaults, now: Ns) -> None:
+    def reboot(self, drive: Drive, defaults: Defaults) -> None:
         """Go on with other parameters, at rest. Nothing may run or be held."""
         self._drive = drive
         self.defaults = defaults
