@@ -13,6 +13,7 @@ import signal
 from collections.abc import Callable, Sequence
 from contextlib import AsyncExitStack
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 from sacbus.daemon import Configuration, HostedBus, open_bus
@@ -20,18 +21,30 @@ from sacbus.feed import FeedServer
 from sacbus.notify import notify
 from sacbus.output import output_for
 from sacbus.spare import at_once, in_spare_time
+from sacbus.trace.recorder import Recorder
 
 __all__ = ["serve"]
 
 #: Status after Ctrl-C, as a shell expects it (128 + SIGINT).
 INTERRUPTED: Final = 130
 
+#: Seconds after which what has been recorded is in its file, also when nothing more happens.
+SAVED_EVERY: Final = 0.5
+
 #: Status after the terminal was closed (128 + SIGHUP).
 HUNG_UP: Final = 129
 
 
-async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_table: bool) -> int:
+async def serve(
+    configurations: Sequence[Configuration],
+    *,
+    as_json: bool,
+    show_table: bool,
+    record: Path | None = None,
+) -> int:
     """Host buses until SIGINT (status 130), SIGTERM (0) or a closed terminal (129).
+
+    ``record``: where to record all that happens, a file that is written anew.
 
     Raises what :func:`~sacbus.daemon.open_bus` does, and OSError when standard output cannot be
     written any more (BrokenPipeError: its reader has left); the buses are closed in order then too.
@@ -50,6 +63,10 @@ async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_
     _heed_signals(end)
     async with AsyncExitStack() as stack:
         buses = [await stack.enter_async_context(open_bus(one)) for one in configurations]
+        recorder = None
+        if record is not None:
+            sink = stack.enter_context(record.open("wb"))
+            recorder = stack.enter_context(Recorder(buses, sink))
         for bus in buses:
             feed = FeedServer(bus)
             await feed.open()
@@ -70,7 +87,11 @@ async def serve(configurations: Sequence[Configuration], *, as_json: bool, show_
         notify("READY=1")
         while not ended.done():
             await in_spare_time(output.drawing(), [bus.host for bus in buses])
-            await asyncio.wait([ended], timeout=output.interval)
+            interval = output.interval
+            if recorder is not None:
+                recorder.flush()
+                interval = min(interval or SAVED_EVERY, SAVED_EVERY)
+            await asyncio.wait([ended], timeout=interval)
         notify("STOPPING=1")
         at_once(output.drawing())
         status = ended.result()

@@ -175,6 +175,13 @@ def test_a_capture_is_written_with_or_without_a_recording(file: Path, tmp_path: 
     assert b"\x02\x0a\x01m40v300\x03" in alone.read_bytes()
 
 
+def test_pins_are_written_as_vcd(file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.vcd"
+    assert run(["run", str(file), "--vcd", str(path)]) == 0
+    assert path.read_text().startswith("$")
+    assert " clk $end" in path.read_text()
+
+
 def test_a_page_that_cannot_be_written_is_one_line(file: Path, capsys: Captured) -> None:
     assert run(["run", str(file), "--record", str(file.parent / "no" / "r")]) == 1
     assert capsys.readouterr().err == (

@@ -17,8 +17,10 @@ import click
 
 from sacbus import __version__
 from sacbus.cli.check import check_command
+from sacbus.cli.diff import diff_command
 from sacbus.cli.dissector import dissector_command
 from sacbus.cli.eeprom import eeprom_group
+from sacbus.cli.export import export_command
 from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
 from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, verbose
@@ -61,6 +63,8 @@ for command in (
     run_command,
     plan_command,
     queue_command,
+    export_command,
+    diff_command,
     check_command,
     eeprom_group,
     kinds_command,
@@ -113,9 +117,12 @@ def _is_for_users(fault: Exception) -> bool:
 
 
 def _mistakes(fault: Exception) -> list[str] | None:
-    """The lines about a configuration that is wrong; None for other faults."""
+    """The lines about a file of the user's that is wrong; None for other faults."""
     from sacbus.config.mistake import ConfigError
 
+    recording = sys.modules.get("sacbus.trace.reading")  # who has met none needs no numpy
+    if recording is not None and isinstance(fault, recording.RecordingError):
+        return [str(fault)]
     return [str(one) for one in fault.mistakes] if isinstance(fault, ConfigError) else None
 
 

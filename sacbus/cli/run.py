@@ -60,6 +60,9 @@ def _read_parameters(
     "--record", type=click.Path(dir_okay=False), metavar="FILE", help="Keep a recording of it."
 )
 @click.option(
+    "--vcd", type=click.Path(dir_okay=False), metavar="FILE", help="Write the nodes' pins as VCD."
+)
+@click.option(
     "--pcap", type=click.Path(dir_okay=False), metavar="FILE", help="Write pcapng for Wireshark."
 )
 @click.option(
@@ -80,6 +83,7 @@ def run_command(
     word: str | None,
     first: bool,
     record: str | None,
+    vcd: str | None,
     pcap: str | None,
     junit: IO[str] | None,
     as_json: bool,
@@ -97,7 +101,7 @@ def run_command(
 
     if real and link is not None:
         raise click.UsageError("expected --real or --link, got both")
-    pages = {"--record": record, "--pcap": pcap}
+    pages = {"--record": record, "--vcd": vcd, "--pcap": pcap}
     kept = [option for option, path in pages.items() if path is not None]
     if kept and link is not None:
         raise click.UsageError(
@@ -117,7 +121,7 @@ def run_command(
         with _Progress(scenario) as progress, _opened(record, bool(kept)) as file:
             result = _played(scenario, real, link, speed, file, progress.come_to)
             if result.recording is not None:
-                _export(result.recording, pcap)
+                _export(result.recording, vcd, pcap)
         results.append(result)
         if not as_json:
             _tell(result)
@@ -188,8 +192,13 @@ def _opened(path: str | None, needed: bool) -> Iterator[BinaryIO | None]:
         yield file
 
 
-def _export(recording: Recording, pcap: str | None) -> None:
+def _export(recording: Recording, vcd: str | None, pcap: str | None) -> None:
     """Write what is made of a recording. Each form is loaded only where it is asked for."""
+    if vcd is not None:
+        from sacbus.trace.vcd import write_vcd
+
+        with Path(vcd).open("w", encoding="utf-8", newline="") as page:
+            write_vcd(recording, page)
     if pcap is not None:
         from sacbus.trace import write_pcapng
 

@@ -107,6 +107,12 @@ __all__ = ["serve_command"]
     is_flag=True,
     help="Give programs their own bytes back, as 2-wire adapters do, and expect that of adapters.",
 )
+@click.option(
+    "--record",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Record everything from the first instant on (see docs/recordings.md).",
+)
 @click.option("--no-table", is_flag=True, help="No live table on a terminal.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line instead of text.")
 @verbose
@@ -118,6 +124,7 @@ def serve_command(
     precise: bool,
     as_json: bool,
     no_table: bool,
+    record: Path | None,
     **given: Any,  # noqa: ANN401 (what describes one bus, see _one_bus)
 ) -> int:
     """Host a bus, or all buses of a configuration, and print where to connect. Ctrl-C ends it.
@@ -156,7 +163,7 @@ def serve_command(
         if given["ephemeral"]:
             buses = tuple(replace(bus, state=None) for bus in buses)
     with asyncio.Runner(loop_factory=lambda: real_loop(precise=precise)) as runner:
-        return runner.run(serve(buses, as_json=as_json, show_table=not no_table))
+        return runner.run(serve(buses, as_json=as_json, show_table=not no_table, record=record))
 
 
 def _one_bus(

@@ -16,7 +16,7 @@ from sacbus.hosted import HostedBus
 from sacbus.kernel import MS, LineRate, Ns
 from sacbus.links import Line as Link
 from sacbus.mother import Caller, Clock
-from sacbus.node import Heard, Node, Protocol, Report, ReportKind
+from sacbus.node import Heard, Protocol, Report, ReportKind
 from sacbus.panel import Panel
 from sacbus.scenario.line import Line, Passed
 from sacbus.scenario.tape import Tape
@@ -57,6 +57,8 @@ class Bench:
         self.look: Ns = LOOK
         #: By the addresses of the configuration, whatever a node is called by now.
         self.panels: dict[int, Panel] = {}
+        #: Called after something was said on the line, or done to nodes.
+        self.stirred: list[Callable[[], object]] = []
         self.shown: dict[int, bytearray] = {}
         self.warnings: Counter[int | None] = Counter()
         #: The last of them in words, with the time of each.
@@ -69,13 +71,12 @@ class Bench:
     def begin(self, origin: Ns) -> None:
         """The scenario begins now, which is its time 0."""
         self.origin = origin
-        self.warnings.clear()
-        self.warned.clear()
         self._collided_before = self._collided()
 
-    def node(self, address: int) -> Node:
-        """The node that is configured at ``address``."""
-        return self.panels[address].node
+    def stir(self) -> None:
+        """Something was said or done: who waits for what may come of it looks again."""
+        for stirred in tuple(self.stirred):
+            stirred()
 
     def counts(self, nodes: tuple[int, ...] | None = None) -> dict[str, int]:
         """What has been counted of these nodes, or of all, since the beginning."""
@@ -182,6 +183,7 @@ def _watch(bench: Bench, hosted: HostedBus) -> None:
         if sent.hits is not None or sent.passage is not None:
             data = sent.outcome(seed)
         line.note(Passed(sent.start, sent.end, sent.lane, who, data, sent.collided, sent.faults))
+        bench.stir()
 
     def report(told: Report) -> None:
         if told.kind is ReportKind.WARNING:

@@ -35,6 +35,9 @@ def queue_edits(file: Path, name: str) -> tuple[str, ...]:
 
 def _edits(position: int, move: str) -> Iterator[str]:
     head = edit = f"q{position}"
+    if len(head) + len(move) <= MOST:
+        yield head + move
+        return
     fields = _FIELDS.findall(move)
     # The unit belongs to the steps: they go together.
     steps = [one for one in fields if one[0] in "mpf"]

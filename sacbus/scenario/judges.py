@@ -4,19 +4,20 @@ Owns when a judge looks and when it has seen enough. A judge is begun once and c
 once, with nothing if all is as expected, and with what came otherwise. Synchronous; the bench's
 clock is all the time it knows.
 
-What a node does tells nobody when it changes, so it is looked at each millisecond, when the node
-itself wants to wake, and when the time is over: the end of a command is seen at its very instant, a
-position that is passed at speed only if it lies in bounds for a millisecond.
+What a node does tells nobody when it changes, so while it moves it is looked at each millisecond,
+when the node itself wants to wake, and when the time is over: the end of a command is seen at its
+very instant, a position that is passed at speed only if it lies in bounds for a millisecond. While
+it rests it is looked at when something is said on the line or done to a node.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import Final, assert_never
 from typing import Protocol as Contract
-from typing import assert_never
 
-from sacbus.kernel import Ns
+from sacbus.kernel import MS, Ns
 from sacbus.node import Said
 from sacbus.panel import Panel
 from sacbus.scenario.bench import Bench
@@ -37,6 +38,13 @@ from sacbus.scenario.motion import deviation, start_skew
 from sacbus.scenario.quantity import Bounds, time_text
 
 __all__ = ["Judge", "judge"]
+
+#: States in which a node does nothing until something is done to it, unless it is to wake.
+_RESTS: Final = frozenset({"STANDBY", "SYNC", "OFF"})
+
+#: How often a node that rests is looked at all the same: somebody may type at its terminal who is
+#: not in the scenario.
+REST: Final[Ns] = 100 * MS
 
 Verdict = Callable[[str | None], None]
 
@@ -83,6 +91,10 @@ class _Look(Contract):
         """When something changes next at the latest, if that is known."""
         ...
 
+    def rests(self) -> bool:
+        """Whether nothing can change before something is done to a node, or said on the line."""
+        ...
+
 
 class _Looks:
     """Looks again and again: until it fits, or, with ``lasting``, for as long as it must."""
@@ -96,23 +108,40 @@ class _Looks:
         self._lasting: Ns = 0 if isinstance(timed, Shown) else timed.lasting
         self._span: Ns = self._lasting or timed.within
         self._until: Ns = 0
+        #: The number of the appointment that counts.
+        self._turn = 0
+        self._resting = False
 
     def begin(self, since: Ns) -> None:
         self._until = since + self._span
-        self._see()
+        self._bench.stirred.append(self._stir)
+        self._see(0)
 
-    def _see(self) -> None:
+    def _stir(self) -> None:
+        """Something was done or said: look once that is over, if nothing else would bring it."""
+        if self._resting:
+            self._resting = False
+            self._turn += 1
+            self._bench.clock.at(self._bench.clock.now, self._see, self._turn)
+
+    def _see(self, turn: int) -> None:
+        if turn != self._turn:
+            return
         clock = self._bench.clock
         now = clock.now
         fits = self._look.fits()
         if fits is not bool(self._lasting) or now >= self._until:
+            self._turn += 1
+            self._bench.stirred.remove(self._stir)
             self._verdict(None if fits else self._look.got())
             return
-        when = min(now + self._bench.look, self._until)
+        self._resting = self._look.rests()
+        when = now + (REST if self._resting else self._bench.look)
         changes = self._look.next_at()
         if changes is not None and now < changes < when:
             when = changes
-        clock.at(when, self._see)
+        self._turn += 1
+        clock.at(min(when, self._until), self._see, self._turn)
 
 
 class _NodeLook:
@@ -164,6 +193,13 @@ class _NodeLook:
         times = [panel.node.wake_at() for panel in self._panels.values()]
         return min((one for one in times if one is not None), default=None)
 
+    def rests(self) -> bool:
+        now = self._clock.now
+        return all(
+            panel.node.wake_at() is None and panel.node.state(now) in _RESTS
+            for panel in self._panels.values()
+        )
+
     def _words(self, address: int, panel: Panel) -> str:
         expected = self._expected
         seen = panel.node.snapshot(self._clock.now)
@@ -193,6 +229,9 @@ class _CountLook:
     def next_at(self) -> Ns | None:
         return None
 
+    def rests(self) -> bool:
+        return False
+
 
 class _ShownLook:
     def __init__(self, bench: Bench, expected: Shown) -> None:
@@ -211,6 +250,9 @@ class _ShownLook:
 
     def next_at(self) -> Ns | None:
         return None
+
+    def rests(self) -> bool:
+        return False
 
 
 class _MotionJudge:

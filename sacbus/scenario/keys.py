@@ -72,9 +72,9 @@ def _is_tables(value: object) -> bool:
 
 
 def _is_lines(value: object) -> bool:
-    if isinstance(value, list):
-        return bool(value) and all(isinstance(one, str) for one in value)
-    return isinstance(value, str)
+    """A line that is an address alone may be a number: what ``{node}`` becomes."""
+    given = value if isinstance(value, list) else [value]
+    return bool(given) and all(isinstance(one, str) or _whole(0, 255)(one) for one in given)
 
 
 def _is_nodes(value: object) -> bool:
@@ -224,7 +224,7 @@ SEND: Final = (
         "every",
         TIME,
         _is_time,
-        "polls: one line each time, in turn, while the steps below go on",
+        "polls: a line each time, in turn (with each: all nodes'), while the steps below go on",
         otherwise="all lines once",
     ),
     Key(

@@ -11,19 +11,16 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Final
 
 from sacbus.bus import FaultOn
 from sacbus.kernel import SECOND, Ns
 from sacbus.mother import (
     Acknowledged,
     MotherError,
-    NoAnswer,
-    Refused,
     Sent,
-    UnknownOutcome,
     addressed_line,
 )
+from sacbus.scenario.asking import Polling, ask, outcome_of, told
 from sacbus.scenario.bench import Bench
 from sacbus.scenario.expectations import Counted, Shown
 from sacbus.scenario.judges import judge
@@ -32,7 +29,6 @@ from sacbus.scenario.values import (
     Disturb,
     Lift,
     Mark,
-    Outcome,
     Pause,
     Pin,
     Poll,
@@ -46,17 +42,6 @@ from sacbus.scenario.values import (
 )
 
 __all__ = ["Play", "predecessor"]
-
-#: Failures of one polling step that are told one by one; of the rest only how many there were.
-TOLD: Final = 3
-
-_OUTCOMES: Final[Mapping[type, Outcome]] = {
-    Acknowledged: "ack",
-    Sent: "ack",
-    Refused: "nak",
-    NoAnswer: "no answer",
-    UnknownOutcome: "unknown",
-}
 
 
 def predecessor(steps: tuple[Step, ...], index: int) -> int | None:
@@ -186,6 +171,7 @@ class Play:
                     panel.turn(detents)
                 case Power(on=on):
                     panel.power(on=on)
+        bench.stir()
 
     def _settle(
         self, index: int, expected: str = "", got: str | None = None, at: Ns | None = None
@@ -264,16 +250,16 @@ class Play:
         def done(outcome: Acknowledged | Sent | MotherError) -> None:
             if self.over:
                 return
-            got = _outcome(outcome)
+            got = outcome_of(outcome)
             self._record(bench, line, outcome, got)
             if send.outcome not in ("any", got):
-                self._settle(index, f"{line!r} to end in {send.outcome}", _told(outcome))
+                self._settle(index, f"{line!r} to end in {send.outcome}", told(outcome))
             elif number + 1 < len(send.lines):
                 self._send(index, send, number + 1)
             else:
                 self._settle(index)
 
-        _ask(bench, line, done, accept_duplicates=send.accept_duplicates)
+        ask(bench, line, done, accept_duplicates=send.accept_duplicates)
 
     def _record(
         self, bench: Bench, line: str, outcome: Acknowledged | Sent | MotherError, told: str
@@ -290,7 +276,7 @@ class Play:
         )
 
     def _begin_poll(self, index: int, poll: Poll) -> None:
-        polling = _Polling(self._bench(poll.bus), poll, partial(self._poll_failed, index))
+        polling = Polling(self._bench(poll.bus), poll, partial(self._poll_failed, index))
         self._background.add(index)
         polling.begin(lambda: not self.over)
         if poll.lasting is not None:
@@ -303,7 +289,7 @@ class Play:
         if not self.over:
             self._fail(index, expected, got)
 
-    def _poll_over(self, index: int, polling: _Polling) -> None:
+    def _poll_over(self, index: int, polling: Polling) -> None:
         polling.stop()
         self._settle(index)
 
@@ -320,80 +306,6 @@ class Play:
                 self._settle(index, at=when)
 
         self._clock.at(when, out)
-
-
-class _Polling:
-    """Lines sent in turn at a pace. Each costs an appointment, and no task of a loop."""
-
-    def __init__(self, bench: Bench, poll: Poll, failed: Callable[[str, str], None]) -> None:
-        self._bench = bench
-        self._poll = poll
-        self._failed = failed
-        self._requests = [(*addressed_line(line), line) for line in poll.lines]
-        self._next = 0
-        self._due: Ns = 0
-        self._failures = 0
-        self._goes_on: Callable[[], bool] = lambda: True
-        self._stopped = False
-
-    def begin(self, goes_on: Callable[[], bool]) -> None:
-        self._goes_on = goes_on
-        self._due = self._bench.clock.now
-        self._ask()
-
-    def stop(self) -> None:
-        """Ask no more."""
-        self._stopped = True
-
-    def _ask(self) -> None:
-        if self._stopped or not self._goes_on():
-            return
-        node, command, _ = self._requests[self._next]
-        self._due += self._poll.every
-        caller = self._bench.caller
-        body = command.encode("latin-1")
-        if node == 0:
-            caller.broadcast(body, self._done)
-        else:
-            caller.call(node, body, self._done)
-
-    def _done(self, outcome: Acknowledged | Sent | MotherError) -> None:
-        wanted = self._poll.outcome
-        if wanted not in ("any", _outcome(outcome)):
-            self._failures += 1
-            if self._failures <= TOLD:
-                line = self._requests[self._next][2]
-                more = ", and is not told of again" if self._failures == TOLD else ""
-                self._failed(f"poll {line!r} to end in {wanted}", f"{_told(outcome)}{more}")
-        self._next = (self._next + 1) % len(self._requests)
-        clock = self._bench.clock
-        clock.at(max(self._due, clock.now), self._ask)
-
-
-def _ask(
-    bench: Bench,
-    line: str,
-    done: Callable[[Acknowledged | Sent | MotherError], None],
-    *,
-    accept_duplicates: bool,
-) -> None:
-    node, command = addressed_line(line)
-    body = command.encode("latin-1")
-    if node == 0:
-        bench.caller.broadcast(body, done)
-    else:
-        bench.caller.call(node, body, done, accept_duplicates=accept_duplicates)
-
-
-def _outcome(outcome: Acknowledged | Sent | MotherError) -> Outcome:
-    return _OUTCOMES.get(type(outcome), "lost")
-
-
-def _told(outcome: Acknowledged | Sent | MotherError) -> str:
-    """An outcome in words."""
-    if isinstance(outcome, MotherError):
-        return f"{_outcome(outcome)} ({outcome})"
-    return _outcome(outcome)
 
 
 def _called(deed: object) -> str:

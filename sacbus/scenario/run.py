@@ -11,7 +11,7 @@ import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AsyncExitStack, contextmanager, suppress
 from io import BytesIO
-from typing import BinaryIO, Final
+from typing import Any, BinaryIO, Final
 
 from sacbus.configuration import Configuration, check
 from sacbus.daemon import open_bus
@@ -108,8 +108,7 @@ async def _really(
             benches[bus.configuration.name] = bench
         play = Play(scenario, benches)
         stack.enter_context(_recorded(play, hosted, benches, record))
-        over = asyncio.get_running_loop().create_future()
-        play.when_over = lambda: over.set_result(None)
+        over = _over(play)
         first = hosted[0]
         first.host.arrive(play.begin)
         await _until(over, progress, first.now)
@@ -134,8 +133,7 @@ async def _far(scenario: Scenario, link: str, progress: Progress | None) -> Resu
         clock = LoopClock(loop)
         bench = far_bench(bus.name, clock, protocol, line, rate, LINK_SLACK)
         play = Play(scenario, {bus.name: bench})
-        over = loop.create_future()
-        play.when_over = lambda: over.set_result(None)
+        over = _over(play)
         play.begin()
         await _until(over, progress, lambda: clock.now)
         return play.result
@@ -162,6 +160,28 @@ def _recorded(
         yield
     finally:
         play.result.recording = tape.close()
+
+
+def _over(play: Play) -> asyncio.Future[None]:
+    """Done when the play is over; what goes wrong in an event of its clock comes out of it."""
+    loop = asyncio.get_running_loop()
+    over: asyncio.Future[None] = loop.create_future()
+
+    def broken(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        fault = context.get("exception")
+        if isinstance(fault, Exception) and not over.done():
+            over.set_exception(fault)
+        else:
+            loop.default_exception_handler(context)
+
+    loop.set_exception_handler(broken)
+
+    def end() -> None:
+        if not over.done():
+            over.set_result(None)
+
+    play.when_over = end
+    return over
 
 
 async def _until(

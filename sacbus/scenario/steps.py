@@ -9,33 +9,20 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from sacbus.bus import FaultError, fault_from
 from sacbus.config import lines
 from sacbus.config.keys import Key, shown
 from sacbus.config.mistake import Findings
-from sacbus.config.notation import addresses
 from sacbus.config.source import Source
 from sacbus.config.table import Table, tables
 from sacbus.configuration import Configuration
-from sacbus.kernel import Ns
 from sacbus.language.queue_file import WrongRow
 from sacbus.scenario.edits import queue_edits
-from sacbus.scenario.expectations import (
-    Counted,
-    Expectation,
-    NodeIs,
-    PacketSeen,
-    Shown,
-    Silent,
-    Straight,
-    Together,
-)
+from sacbus.scenario.expecting import ExpectationReader, time_of
 from sacbus.scenario.keys import (
     DEEDS,
     EXPECT,
-    EXPECTED,
     MOST_STEPS,
     PIN,
     POWER,
@@ -46,7 +33,6 @@ from sacbus.scenario.keys import (
     TYPE,
 )
 from sacbus.scenario.parameters import Value, put_in
-from sacbus.scenario.quantity import bounds, nanoseconds
 from sacbus.scenario.values import (
     Deed,
     Disturb,
@@ -62,7 +48,6 @@ from sacbus.scenario.values import (
     Turn,
     Type,
 )
-from sacbus.wire import DC1, DC2
 
 __all__ = ["StepReader", "Written"]
 
@@ -85,7 +70,7 @@ class StepReader:
     def __init__(self, source: Source, findings: Findings, buses: Sequence[Configuration]) -> None:
         self._source = source
         self._findings = findings
-        self._buses = buses
+        self._expected = ExpectationReader(findings, buses)
         self._count = 0
         #: The bus of steps that name none: that of the group that they are in.
         self._bus = ""
@@ -113,7 +98,10 @@ class StepReader:
         loop = Table.read(Findings("", {}), path, filled, STEP)
         each: tuple[int | None, ...] = (None,)
         if "each" in loop.values:
-            each = self._nodes(loop.get("each"), loop.get("bus", self._bus))
+            each = self._expected.nodes(loop.get("each"), loop.get("bus", self._bus))
+            if "every" in content and "send" in content:
+                content = self._round(path, content, each, scope)
+                each = (None,)
         found: list[Written] = []
         for number in range(loop.get("repeat", 1)):
             for node in each:
@@ -131,6 +119,25 @@ class StepReader:
                     return found
                 found += self._step(path, content, header, inner)
         return found
+
+    def _round(
+        self,
+        path: lines.Path,
+        content: Mapping[str, object],
+        nodes: Sequence[int | None],
+        scope: Mapping[str, Value],
+    ) -> Mapping[str, object]:
+        """A step that polls each node: one step, whose lines are those of all nodes in turn."""
+        given = content["send"]
+        found: list[object] = []
+        for node in nodes:
+            assert node is not None, "addresses"
+            inner = {**scope, "node": node}
+            found += [
+                put_in(line, inner, (*path, "send"), self._findings, set())
+                for line in (given if isinstance(given, list) else [given])
+            ]
+        return {**content, "send": found}
 
     def _step(
         self,
@@ -180,7 +187,7 @@ class StepReader:
     def _when(self, table: Table, deed: Deed, name: str | None = None) -> Step:
         after = table.get("after")
         if isinstance(after, dict):
-            after = self._expectation(
+            after = self._expected.read(
                 Table.read(self._findings, table.at("after"), after, EXPECT),
                 table.get("bus", self._bus),
             )
@@ -188,9 +195,9 @@ class StepReader:
         return Step(
             deed,
             table.get("name", "") if name is None else name,
-            _time(table, "at"),
+            time_of(table, "at"),
             after,
-            _time(table, "wait") or 0,
+            time_of(table, "wait") or 0,
             f"{self._source.name}:{line}",
         )
 
@@ -199,7 +206,8 @@ class StepReader:
         value = table.get(name)
         match name:
             case "send":
-                return self._send(table, (value,) if isinstance(value, str) else tuple(value), bus)
+                lines_ = value if isinstance(value, list) else [value]
+                return self._send(table, tuple(map(str, lines_)), bus)
             case "raw":
                 return Raw(bytes.fromhex(value), bus)
             case "mark":
@@ -207,22 +215,22 @@ class StepReader:
             case "wait":
                 return Pause()
             case "expect":
-                return self._expectation(self._inner(table, name, EXPECT), bus)
+                return self._expected.read(self._inner(table, name, EXPECT), bus)
             case "type":
                 inner = self._inner(table, name, TYPE)
                 if not _has(inner, "node", "keys"):
                     return None
-                return Type(self._nodes(inner.get("node"), bus), inner.get("keys"), bus)
+                return Type(self._expected.nodes(inner.get("node"), bus), inner.get("keys"), bus)
             case "turn":
                 inner = self._inner(table, name, TURN)
                 if not _has(inner, "node", "detents"):
                     return None
-                return Turn(self._nodes(inner.get("node"), bus), inner.get("detents"), bus)
+                return Turn(self._expected.nodes(inner.get("node"), bus), inner.get("detents"), bus)
             case "power":
                 inner = self._inner(table, name, POWER)
                 if not _has(inner, "node", "on"):
                     return None
-                return Power(self._nodes(inner.get("node"), bus), inner.get("on"), bus)
+                return Power(self._expected.nodes(inner.get("node"), bus), inner.get("on"), bus)
             case "fault":
                 return self._fault(table, value, bus)
             case "lift":
@@ -234,12 +242,12 @@ class StepReader:
 
     def _send(self, table: Table, lines_: tuple[str, ...], bus: str) -> Deed:
         outcome = table.get("outcome", "ack")
-        every = _time(table, "every")
+        every = time_of(table, "every")
         if every is None:
             if "for" in table.values:
                 self._findings.add(table.at("for"), "expected only with every", "remove it")
             return Send(lines_, outcome, table.get("accept_duplicates", False), bus)
-        return Poll(lines_, every, _time(table, "for"), outcome, bus)
+        return Poll(lines_, every, time_of(table, "for"), outcome, bus)
 
     def _fault(self, table: Table, value: Mapping[str, object], bus: str) -> Deed | None:
         try:
@@ -254,7 +262,7 @@ class StepReader:
         inner = self._inner(table, "queue", QUEUE)
         if not _has(inner, "node", "file"):
             return None
-        nodes = (0,) if inner.get("node") == 0 else self._nodes(inner.get("node"), bus)
+        nodes = (0,) if inner.get("node") == 0 else self._expected.nodes(inner.get("node"), bus)
         file = self._source.directory / os.path.expanduser(inner.get("file"))  # noqa: PTH111
         try:
             edits = queue_edits(file, inner.get("file"))
@@ -285,109 +293,12 @@ class StepReader:
             self._findings.add(inner.path, "expected a pin and its level, got none", "give one")
         if not _has(inner, "node") or not levels:
             return None
-        return Pin(self._nodes(inner.get("node"), bus), levels, bus)
+        return Pin(self._expected.nodes(inner.get("node"), bus), levels, bus)
 
     def _inner(self, table: Table, name: str, keys: Sequence[Key], *, whole: bool = True) -> Table:
         content = table.get(name)
         return Table.read(self._findings, table.at(name), content, keys, whole=whole)
 
-    def _expectation(self, table: Table, bus: str) -> Expectation | None:
-        sorts = {EXPECTED[name]: name for name in EXPECTED if name in table.values}
-        if not sorts:
-            if all(map(table.lacks, EXPECTED)):
-                what = f"expected something to look at ({', '.join(EXPECTED)}), got nothing"
-                self._findings.add(table.path, what, "give one")
-            return None
-        if len(sorts) > 1:
-            what = f"expected one sort of thing, got {' and '.join(sorts.values())}"
-            self._findings.add(table.path, what, "make several steps of it")
-            return None
-        (sort,) = sorts
-        within, lasting = _time(table, "within") or 0, _time(table, "for") or 0
-        if within and lasting:
-            self._findings.add(table.at("for"), "expected within or for, got both", "leave one out")
-        nodes = self._nodes(table.get("node"), bus) if "node" in table.values else None
-        if sort in ("node", "shown", "start_skew", "deviation") and nodes is None:
-            if table.lacks("node"):
-                self._findings.add(
-                    table.path, f"expected node ({EXPECT[0].allowed}), got none", "give one"
-                )
-            return None
-        match sort:
-            case "node":
-                assert nodes is not None
-                return NodeIs(
-                    nodes,
-                    _bounds(table, "position"),
-                    _bounds(table, "velocity"),
-                    table.get("state"),
-                    table.get("pin", {}),
-                    within,
-                    lasting,
-                    bus,
-                )
-            case "shown":
-                assert nodes is not None
-                return self._shown(table, nodes, within, bus)
-            case "packet":
-                return self._packet(table, within, bus)
-            case "start_skew":
-                return Together(nodes or (), nanoseconds(table.get("start_skew")), bus)
-            case "deviation":
-                return Straight(nodes or (), table.get("deviation"), bus)
-            case "silence":
-                return Silent(nanoseconds(table.get("silence")), table.get("from"), bus)
-            case _:
-                counts = {
-                    name: bounds(table.get(name))
-                    for name in EXPECTED
-                    if EXPECTED[name] == "count" and name in table.values
-                }
-                return Counted(counts, nodes, within, lasting, bus)
-
-    def _shown(
-        self, table: Table, nodes: tuple[int, ...], within: Ns, bus: str
-    ) -> Expectation | None:
-        if len(nodes) != 1:
-            self._findings.add(table.at("node"), "expected one node", "make a step of each")
-            return None
-        return Shown(nodes[0], table.get("shown"), within, bus)
-
-    def _packet(self, table: Table, within: Ns, bus: str) -> Expectation:
-        body: bytes | None = None
-        kind, source, destination = "packet", table.get("from"), table.get("to")
-        if "packet" in table.values:
-            body = table.get("packet").encode("latin-1", "replace")
-        if "soft_op" in table.values:
-            body = bytes((DC1 if table.get("soft_op") == "start" else DC2,))
-            destination = 0
-        kind = table.get("answer", kind)
-        return PacketSeen(
-            kind,
-            body,
-            table.get("pattern"),
-            source,
-            destination,
-            table.get("count", 1),
-            within,
-            bus,
-        )
-
-    def _nodes(self, given: Any, bus: str) -> tuple[int, ...]:  # noqa: ANN401 (has been looked at)
-        """Addresses as ``_NODES`` takes them."""
-        if given == "all":
-            there = [one for one in self._buses if not bus or one.name == bus]
-            return tuple(node.address for one in there[:1] for node in one.every_node)
-        return addresses(given) if isinstance(given, str) else (given,)
-
 
 def _has(table: Table, *names: str) -> bool:
     return all(name in table.values for name in names)
-
-
-def _time(table: Table, name: str) -> Ns | None:
-    return nanoseconds(table.get(name)) if name in table.values else None
-
-
-def _bounds(table: Table, name: str) -> Any:  # noqa: ANN401
-    return bounds(table.get(name)) if name in table.values else None

@@ -18,6 +18,7 @@ from sacbus.trace.packets import Packet, packets
 from sacbus.trace.records import (
     FORMAT,
     BusAt,
+    Changed,
     Driven,
     Ended,
     FaultSet,
@@ -31,6 +32,7 @@ from sacbus.trace.records import (
     Told,
     Turned,
 )
+from sacbus.trace.states import with_states
 from sacbus.trace.track import Track
 
 __all__ = ["Recording", "RecordingError", "read"]
@@ -98,6 +100,10 @@ class Recording:
                 self.end = record.when
                 self.whole = type(record) is Ended
                 yield record
+
+    def events(self) -> Iterator[Record | Changed]:
+        """All records, and each change of a node's state at its time."""
+        return with_states(self)
 
     def packets(self, bus: int = 0) -> Iterator[Packet]:
         """What was said on a bus, as a receiver that hears everything understands it."""

@@ -16,6 +16,7 @@ from sacbus.movement import Segment
 __all__ = [
     "FORMAT",
     "BusAt",
+    "Changed",
     "Driven",
     "Ended",
     "FaultSet",
@@ -99,6 +100,16 @@ class Moved:
     bus: int
     node: int
     segment: Segment
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """A node's state is another one; not stored, but worked out of how it moves."""
+
+    when: Ns
+    bus: int
+    node: int
+    state: str
 
 
 @dataclass(frozen=True, slots=True)

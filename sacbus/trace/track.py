@@ -9,33 +9,26 @@ that follows without a gap, or single pulses.
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sacbus.kernel import Ns
+from sacbus.kernel import US, Ns
 from sacbus.movement import Segment
 from sacbus.trace.records import NodeOf
 
 if TYPE_CHECKING:
     from sacbus.movement import Times
 
-__all__ = ["Track", "joint"]
+__all__ = ["Track"]
 
 _SINCE: Final = attrgetter("since")
 
 #: Later than every instant.
 FOR_EVER: Final[Ns] = 1 << 62
-
-
-def joint(before: Segment | None, after: Segment) -> int:
-    """Pulses at the instant at which ``after`` takes the place of ``before``, signed."""
-    if before is None or after.anew:
-        return 0
-    return after.position(after.since) - before.position(after.since)
 
 
 class Track:
@@ -97,6 +90,32 @@ class Track:
         """When pulses were issued in [since, until), rising: ns, int64. Single ones count too."""
         return _joined([times for times, _ in self._parts(since, until)])
 
+    def edges(self, since: Ns, until: Ns) -> tuple[Times, Times]:
+        """When clk rises, with each of :meth:`pulses`, and when it falls again after each.
+
+        Of single pulses nobody knows more than the instant at which they were asked for: they are
+        shown from then on, one after the other, a microsecond each and a microsecond apart.
+        """
+        rises, falls = [], []
+        for number, low, high in self._windows(since, until):
+            segment = self.segments[number]
+            if segment.since >= since and (jump := abs(self._jump(number))):
+                # The first pulse of a command that follows without a gap is no single one.
+                if segment.started == segment.since:
+                    rises.append(np.array([segment.since], dtype=np.int64))
+                    falls.append(segment.pulse_ends(segment.since, segment.since + 1))
+                    jump -= 1
+                single = segment.since + 2 * US * np.arange(jump, dtype=np.int64)
+                rises.append(single)
+                falls.append(single + US)
+            rises.append(segment.pulse_times(low, high))
+            falls.append(segment.pulse_ends(low, high))
+        return _joined(rises), _joined(falls)
+
+    def forget(self, until: Ns) -> None:
+        """Keep only what tells of instants from ``until`` on; for who goes through a long one."""
+        del self.segments[: max(bisect_left(self.segments, until, key=_SINCE) - 1, 0)]
+
     def directions(self, since: Ns, until: Ns) -> Times:
         """For each of :meth:`pulses` +1 where it turned clockwise, else -1."""
         parts = self._parts(since, until)
@@ -104,23 +123,30 @@ class Track:
 
     def _parts(self, since: Ns, until: Ns) -> Iterator[tuple[Times, int]]:
         """Pulses that are of one direction each, with it."""
-        first = max(bisect_right(self.segments, since, key=_SINCE) - 1, 0)
-        # Those that began at the same instant have their joints there.
-        while first > 0 and self.segments[first].since == since:
-            first -= 1
-        for number in range(first, len(self.segments)):
+        for number, low, high in self._windows(since, until):
             segment = self.segments[number]
-            if segment.since >= until:
-                return
-            if segment.since >= since:
-                jump = joint(self.segments[number - 1] if number else None, segment)
-                if jump:
-                    yield np.full(abs(jump), segment.since, dtype=np.int64), 1 if jump > 0 else -1
-            low = max(since, segment.since + 1)
-            high = min(until, self._follows(number) + 1)
+            if segment.since >= since and (jump := self._jump(number)):
+                yield np.full(abs(jump), segment.since, dtype=np.int64), 1 if jump > 0 else -1
             times = segment.pulse_times(low, high)
             if times.size:
                 yield times, 1 if segment.position(high - 1) > segment.position(low - 1) else -1
+
+    def _windows(self, since: Ns, until: Ns) -> Iterator[tuple[int, Ns, Ns]]:
+        """The segments that say something of [since, until), by number, and of which part of it."""
+        # Those that began at the same instant have their joints there.
+        first = max(bisect_left(self.segments, since, key=_SINCE) - 1, 0)
+        for number in range(first, len(self.segments)):
+            began = self.segments[number].since
+            if began >= until:
+                return
+            yield number, max(since, began + 1), min(until, self._follows(number) + 1)
+
+    def _jump(self, number: int) -> int:
+        """Pulses at the instant at which a segment begins that came of nothing before, signed."""
+        segment = self.segments[number]
+        if number == 0 or segment.anew:
+            return 0
+        return segment.position(segment.since) - self.segments[number - 1].position(segment.since)
 
     def _follows(self, number: int) -> Ns:
         """When the next segment begins."""

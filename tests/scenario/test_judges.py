@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from sacbus.kernel import MS, SECOND
 from tests.scenario.stage import failures, played
 
 MOVES = '[[step]]\nsend = "10m400v120"\n'
@@ -121,6 +122,34 @@ def test_packets_are_seen_by_body_pattern_and_addresses(file: Path) -> None:
     assert failures(file, text) == [
         "line 15: expected packet like 'm' within 10 ms, got none and 4 others, at 0.010000 s"
     ]
+
+
+def test_a_packet_to_another_one_is_not_it(file: Path) -> None:
+    text = """
+        [[step]]
+        at = "0 s"
+        expect = { packet = "m400", to = 11, within = "10 ms" }
+        [[step]]
+        at = "0 s"
+        send = "10m400"
+        """
+    assert failures(file, text) == [
+        "line 5: expected packet 'm400' to 11 within 10 ms, got none and 2 others, at 0.010000 s"
+    ]
+
+
+def test_who_is_dead_breaks_no_silence(file: Path) -> None:
+    head = "[[bus]]\n[[bus.nodes]]\naddress = 10\nsoft_ops = true\n"
+    text = """
+        [[step]]
+        send = "10m4"
+        [[step]]
+        FAULT
+        [[step]]
+        expect = { silence = "1 s" }
+        """
+    assert failures(file, text.replace("FAULT", "fault = { dead = 10 }"), head) == []
+    assert len(failures(file, text.replace("FAULT", 'mark = "x"'), head)) == 1
 
 
 def test_soft_ops_are_packets_to_all(file: Path) -> None:
@@ -257,3 +286,44 @@ def test_axes_that_never_moved_have_no_skew_and_no_path(file: Path) -> None:
         ),
         "line 7: expected nodes 10-11: deviation at most 1 steps, got no motion, at 0.000000 s",
     ]
+
+
+# ---- looks --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "deed",
+    [
+        'send = "10m400"',
+        'type = { node = 10, keys = "m400\\r" }',
+        'fault = { babble = { pattern = "02 0a 01 6d 31 30 30 03 00 00", every = "1 s" } }',
+    ],
+)
+def test_a_node_that_rests_is_seen_to_move_as_soon_as_it_does(file: Path, deed: str) -> None:
+    text = f"""
+        [[step]]
+        at = "10 s"
+        {deed}
+        [[step]]
+        at = "0 s"
+        expect = {{ node = 10, state = "ACCEL", within = "20 s" }}
+        """
+    result = played(file, text)
+    assert result.passed
+    assert 10 * SECOND < result.ended < 10 * SECOND + 10 * MS
+
+
+def test_a_power_cycle_is_seen_to_its_end(file: Path) -> None:
+    text = """
+        [[step]]
+        at = "10 s"
+        power = { node = 10, on = false }
+        [[step]]
+        power = { node = 10, on = true }
+        [[step]]
+        at = "0 s"
+        expect = { node = 10, state = "BOOT", within = "20 s" }
+        [[step]]
+        expect = { node = 10, state = "STANDBY", within = "2 s" }
+        """
+    assert played(file, text).ended == 11 * SECOND

@@ -16,7 +16,11 @@ from tests.config.reference import rows
 from tests.scenario.reference import TABLES
 
 PAGE = Path(__file__).parents[2] / "docs" / "scenarios.md"
-EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+EXAMPLES = [
+    text
+    for page in (PAGE, PAGE.with_name("first-scenario.md"))
+    for text in re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+]
 
 
 @pytest.mark.parametrize("heading", TABLES)
@@ -44,7 +48,7 @@ def test_everything_that_can_be_expected_has_a_key_and_every_count_is_one() -> N
 
 
 @pytest.mark.parametrize("text", EXAMPLES, ids=range(len(EXAMPLES)))
-def test_every_example_of_the_page_passes(file: Path, text: str) -> None:
+def test_every_example_of_the_pages_passes(file: Path, text: str) -> None:
     """Whole scenarios as they are; steps alone on a bus with nodes 10 and 11."""
     if "[[bus]]" not in text:
         text = f'[[bus]]\n[[bus.nodes]]\naddresses = "10,11"\n{text}'

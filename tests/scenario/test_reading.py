@@ -86,6 +86,23 @@ def test_parameters_stand_in_buses_and_a_mistake_of_all_cases_is_told_once(file:
     ]
 
 
+def test_polling_each_node_is_one_step_with_a_line_of_each(file: Path) -> None:
+    text = """
+        [[step]]
+        each = "all"
+        send = ["{node}", "{node}V10"]
+        every = "40 ms"
+        [[step]]
+        each = "10,11"
+        send = "{node}"
+        """
+    assert [step.does for step in scenario(file, text).steps] == [
+        Poll(("10", "10V10", "11", "11V10"), 40 * MS),
+        Send(("10",)),
+        Send(("11",)),
+    ]
+
+
 def test_buses_may_come_from_a_configuration(file: Path) -> None:
     (file.parent / "c.toml").write_text(HEAD + "[[bus.links]]\nkind = 'pty'\n")
     text = 'buses = "c.toml"\n[[step]]\nsend = ["10m1", "11m1"]\nevery = "40 ms"\nfor = "1 s"\n'

@@ -23,6 +23,8 @@ MOVE = """
     expect = { retries = 0, naks = 0, acks = 2, collisions = 0 }
     """
 
+POLL = '[[step]]\nat = "0 s"\nsend = "10"\nevery = "5 ms"\n'
+
 LINE = """
     [[step]]
     send = ["10m40v300s", "11m40v300s", "0y"]
@@ -98,6 +100,14 @@ def test_real_time_may_be_scaled_and_failures_are_the_same(file: Path) -> None:
         "there",
         "node 10: position 40, state STANDBY; node 11: position 40, state STANDBY",
     )
+
+
+@pytest.mark.slow
+def test_what_goes_wrong_while_it_is_played_comes_out(file: Path) -> None:
+    sink = BytesIO()
+    one = scenario(file, '[[step]]\nmark = "x"\n[[step]]\nwait = "1 h"\n' + POLL)
+    with pytest.raises(ValueError, match="closed file"):
+        run_real(one, record=sink, progress=lambda _now: sink.close())
 
 
 @pytest.mark.slow

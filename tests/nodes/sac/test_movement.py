@@ -114,8 +114,10 @@ deeds = st.one_of(
     st.builds("v{}".format, speeds),
     cuts,
     st.sampled_from(
-        ["sync=0", "sync=1", "estop=0", "estop=1", "power=0", "power=1", "enA=0", "enB=0"]
-        + ["enA=1", "enB=1", "$n", "xclk=900000", "xclk=0"]
+        [
+            *("sync=0", "sync=1", "estop=0", "estop=1", "power=0", "power=1"),
+            *("enA=0", "enB=0", "enA=1", "enB=1", "$n", "xclk=900000", "xclk=0"),
+        ]
     ),
 )
 waits = st.integers(0, 400 * MS)

@@ -1,0 +1,42 @@
+"""What the commands about recordings have in common."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from sacbus.cli.options import WrongInput
+
+if TYPE_CHECKING:
+    from sacbus.trace import Recording
+
+__all__ = ["opened", "span"]
+
+_UNITS: Final = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
+_SPAN: Final = re.compile(r"(\d{1,9})(?:\.(\d{1,9}))?\s*(ns|us|ms|s)")
+
+
+def span(_ctx: click.Context, _param: click.Parameter, given: str) -> int:
+    """A length of time as ns: ``10ms``, ``1.5 us``."""
+    if given == "0":
+        return 0
+    found = _SPAN.fullmatch(given.strip())
+    if found is None:
+        raise click.BadParameter(f"expected a time such as 1us, 10ms or 2s, got {given!r}")
+    whole, fraction, unit = found[1], found[2] or "", found[3]
+    factor = _UNITS[unit]
+    return int(whole) * factor + int(fraction or 0) * factor // int("1" + "0" * len(fraction))
+
+
+def opened(path: str) -> Recording:
+    """A recording; what is none is refused in one line, status 2."""
+    from sacbus.trace import RecordingError, read
+
+    try:
+        return read(path)
+    except RecordingError as fault:
+        raise WrongInput(str(fault)) from fault
+    except OSError as fault:
+        raise WrongInput(f"{path}: {fault.strerror}, name a recording") from fault

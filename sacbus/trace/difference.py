@@ -1,0 +1,195 @@
+"""Two recordings of what should be the same, compared within tolerances.
+
+Owns what counts as a difference. Compared are what was said on each bus, and each node's states and
+positions; not compared is what decides on none of these: reports, marks, collisions by themselves.
+Sequences are walked side by side. Where they part, one that lacks an entry is told from one that
+has another in its place, and the walk goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from sacbus.kernel import Ns
+from sacbus.trace.packets import Packet, packets
+from sacbus.trace.reading import Recording
+from sacbus.trace.track import Track
+
+__all__ = ["Difference", "differences"]
+
+#: Bus time that positions are compared for at once.
+SPELL: Final[Ns] = 10_000_000_000
+
+#: What stands where one of the two has nothing.
+NOTHING: Final = "nothing"
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """``expected`` is the first recording's; ``node`` None: it is about the line."""
+
+    when: Ns
+    bus: str
+    node: int | None
+    what: str
+    expected: str
+    got: str
+
+    def __str__(self) -> str:
+        who = "" if self.node is None else f", node {self.node}"
+        seconds = f"{self.when // 10**9}.{self.when % 10**9:09d}"
+        return (
+            f"{seconds} s, {self.bus}{who}: {self.what}: expected {self.expected}, got {self.got}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """Something in a sequence: when, and what must be equal, in words."""
+
+    when: Ns
+    words: str
+
+
+def differences(
+    expected: Recording, got: Recording, *, within: Ns = 0, steps: float = 0.0
+) -> list[Difference]:
+    """Where ``got`` differs, in the order of time; of a node's positions only the first.
+
+    within: ns by which an instant may differ. steps: full steps by which a position may.
+    """
+    names = [[bus.name for bus in each.buses] for each in (expected, got)]
+    if names[0] != names[1]:
+        return [Difference(0, "recording", None, "buses", _listed(names[0]), _listed(names[1]))]
+    nodes = [
+        [f"{names[0][one.bus]}.{one.address} ({one.kind})" for one in each.nodes]
+        for each in (expected, got)
+    ]
+    if nodes[0] != nodes[1]:
+        return [Difference(0, "recording", None, "nodes", _listed(nodes[0]), _listed(nodes[1]))]
+    found = _of_alike(expected, got, within, steps)
+    return sorted(found, key=lambda one: one.when)  # stable: bus by bus, node by node
+
+
+def _of_alike(
+    expected: Recording, got: Recording, within: Ns, steps: float
+) -> Iterator[Difference]:
+    for bus in expected.buses:
+        said = [
+            [_entry(one) for one in packets(bus, each) if one.sent.bus == bus.number]
+            for each in (expected, got)
+        ]
+        for when, one, other in _walk(said[0], said[1], within):
+            yield Difference(when, bus.name, None, "packet", one, other)
+    over = min(expected.end, got.end)
+    for node in expected.nodes:
+        name = expected.buses[node.bus].name
+        tracks = [each.track(node.address, node.bus) for each in (expected, got)]
+        if not (tracks[0].segments and tracks[1].segments):
+            continue
+        states = [
+            [_Entry(when, state) for when, state in track.states(0, over + 1)] for track in tracks
+        ]
+        for when, one, other in _walk(states[0], states[1], within):
+            yield Difference(when, name, node.address, "state", one, other)
+        apart = _parting(tracks[0], tracks[1], over, within, steps)
+        if apart is not None:
+            places = [f"{track.steps(apart):g} steps" for track in tracks]
+            yield Difference(apart, name, node.address, "position", *places)
+
+
+def _entry(packet: Packet) -> _Entry:
+    said = packet.said
+    sender = f"{packet.sent.sender}" if said.source is None else f"{said.source}"
+    to = "" if said.destination is None else f">{said.destination}"
+    check = f", check {said.verdict}" if said.verdict not in ("", "right") else ""
+    data = f" {said.data.hex()}" if said.kind == "garbage" else ""
+    body = said.data.decode("latin-1") if said.kind == "packet" else said.words
+    return _Entry(packet.start, f"{sender}{to} {body!r}{data}{check}")
+
+
+def _walk(
+    expected: Sequence[_Entry], got: Sequence[_Entry], within: Ns
+) -> Iterator[tuple[Ns, str, str]]:
+    """Where two sequences differ: when, and what stands there in each."""
+    i = j = 0
+    while i < len(expected) or j < len(got):
+        one = expected[i] if i < len(expected) else None
+        other = got[j] if j < len(got) else None
+        if one is None or other is None:
+            left = one or other
+            assert left is not None
+            yield left.when, one.words if one else NOTHING, other.words if other else NOTHING
+            i, j = i + 1, j + 1
+        elif one.words == other.words:
+            if abs(one.when - other.when) > within:
+                yield one.when, one.words, f"{other.words} {other.when - one.when:+} ns off"
+            i, j = i + 1, j + 1
+        elif _comes(one, got, j, within):
+            yield other.when, NOTHING, other.words
+            j += 1
+        elif _comes(other, expected, i, within):
+            yield one.when, one.words, NOTHING
+            i += 1
+        else:
+            yield one.when, one.words, other.words
+            i, j = i + 1, j + 1
+
+
+def _comes(entry: _Entry, among: Sequence[_Entry], place: int, within: Ns) -> bool:
+    """Whether what an entry says stands behind the next one of the other sequence, in time."""
+    return (
+        place + 1 < len(among)
+        and among[place + 1].words == entry.words
+        and abs(among[place + 1].when - entry.when) <= within
+    )
+
+
+def _parting(expected: Track, got: Track, over: Ns, within: Ns, steps: float) -> Ns | None:
+    """The first instant at which two nodes are further apart than both tolerances allow.
+
+    Pulses are compared one by one where both have as many, each as far off as it may be; else
+    positions, at every pulse of either.
+    """
+    for since in range(0, over + 1, SPELL):
+        until = min(since + SPELL, over + 1)
+        if _alike(expected, got, since, until, within):
+            continue
+        pulses = np.concatenate([track.pulses(since, until) for track in (expected, got)])
+        turns = [segment.since for track in (expected, got) for segment in track.segments]
+        places = np.unique(np.concatenate([pulses, [one for one in turns if since <= one < until]]))
+        for place in places.astype(np.int64).tolist():
+            if _apart(expected, got, place, within, steps):
+                return int(place)
+    return None
+
+
+def _alike(expected: Track, got: Track, since: Ns, until: Ns, within: Ns) -> bool:
+    if expected.steps(since) != got.steps(since):
+        return False
+    ours, theirs = expected.pulses(since, until), got.pulses(since, until)
+    return (
+        ours.size == theirs.size
+        and bool(np.all(np.abs(ours - theirs) <= within))
+        and np.array_equal(expected.directions(since, until), got.directions(since, until))
+        and expected.steps(until - 1) == got.steps(until - 1)
+    )
+
+
+def _apart(expected: Track, got: Track, at: Ns, within: Ns, steps: float) -> bool:
+    """Whether no instant that is near enough brings the two near enough, whichever is late."""
+    instants = (at - within, at, at + within)
+
+    def reached(track: Track, target: float) -> bool:
+        places = [track.steps(one) for one in instants]
+        return min(places) - steps <= target <= max(places) + steps
+
+    return not (reached(got, expected.steps(at)) or reached(expected, got.steps(at)))
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) or NOTHING
