@@ -9,7 +9,10 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import Final, NoReturn
+
+TYPE_CHECKING = False  # without `typing`: until `main` runs, Ctrl-C is a traceback
+if TYPE_CHECKING:
+    from typing import Final, NoReturn
 
 __all__ = ["main"]
 

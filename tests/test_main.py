@@ -133,3 +133,18 @@ def test_the_commands_status_is_the_process_s(way: str) -> None:
     )
     assert ended.returncode == 2
     assert ended.stderr.startswith("error: ")
+
+
+@pytest.mark.slow
+def test_what_comes_before_it_imports_next_to_nothing() -> None:
+    # Until `main` runs, Ctrl-C is a traceback; `typing` alone took longer than all of this.
+    asked = "import sys, sacbus.__main__; print(*{'click', 'typing'} & {*sys.modules})"
+    ended = subprocess.run(
+        [sys.executable, "-S", "-c", asked],
+        cwd=Path(__file__).parents[1],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=True,
+    )
+    assert ended.stdout == "\n"

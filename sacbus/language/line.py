@@ -14,7 +14,7 @@ from typing import Final
 
 from .commands import BARE, NO_RAMP, QUEUE_LENGTH, Bare
 
-__all__ = ["DIGITS", "NOTHING", "Line", "Remark", "end_of", "low_byte", "short"]
+__all__ = ["DIGITS", "NOTHING", "Line", "Remark", "end_of", "low_byte", "quoted", "short"]
 
 NOTHING: Final = "the line does nothing"
 DIGITS: Final = re.compile(r"[0-9]*")
