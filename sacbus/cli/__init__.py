@@ -26,6 +26,7 @@ from sacbus.cli.monitor import monitor_command
 from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, verbose
 from sacbus.cli.plan import plan_command
 from sacbus.cli.queue import queue_command
+from sacbus.cli.run import run_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
 from sacbus.cli.terminal import terminal_command
@@ -59,6 +60,7 @@ for command in (
     send_command,
     terminal_command,
     monitor_command,
+    run_command,
     plan_command,
     queue_command,
     export_command,

@@ -15,7 +15,7 @@ from sacbus.config.oddities import oddities
 from sacbus.config.source import Source, load
 from sacbus.daemon import Configuration, NodeAt
 
-__all__ = ["Examined", "Setup", "examine", "read"]
+__all__ = ["Examined", "Setup", "examine", "read", "read_source"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,11 @@ def read(file: str | Path) -> Setup:
 
     Relative paths in it are relative to the file, or to the working directory.
     """
-    source = load(file)
+    return read_source(load(file))
+
+
+def read_source(source: Source) -> Setup:
+    """The setup in a text that has been read; ConfigError with all its mistakes."""
     _, found, findings = _read(source)
     if found is None:
         raise ConfigError(findings.mistakes())

@@ -36,27 +36,30 @@ class Source:
     lines: Mapping[lines.Path, int]
 
 
-def load(file: str | Path) -> Source:
-    """Read a file, or standard input for ``-``; ConfigError when it gives no TOML."""
+def load(file: str | Path, sort: str = "configuration") -> Source:
+    """Read a file, or standard input for ``-``; ConfigError when it gives no TOML.
+
+    ``sort``: what the file should be, in words.
+    """
     if str(file) == "-":
         data = sys.stdin.buffer.read(MOST_BYTES + 1)
-        return parse(data, "standard input", Path.cwd())
+        return parse(data, "standard input", Path.cwd(), sort)
     name = _printable(str(file))
     try:
         with Path(file).open("rb") as opened:
             data = opened.read(MOST_BYTES + 1)
     except OSError as fault:
-        what = f"cannot read the configuration ({fault.strerror or fault})"
+        what = f"cannot read the {sort} ({fault.strerror or fault})"
         raise _wrong(name, what, "check the path and its permissions") from fault
     except ValueError as fault:  # a NUL in its name
         raise _wrong(name, f"no file can have this name ({fault})", "check the path") from fault
-    return parse(data, name, Path(file).absolute().parent)
+    return parse(data, name, Path(file).absolute().parent, sort)
 
 
-def parse(data: bytes, name: str, directory: Path) -> Source:
+def parse(data: bytes, name: str, directory: Path, sort: str = "configuration") -> Source:
     """Bytes to TOML's values; ``name`` is what the mistakes call their origin."""
     if len(data) > MOST_BYTES:
-        what = f"expected a configuration of at most {MOST_BYTES} bytes, got more"
+        what = f"expected a {sort} of at most {MOST_BYTES} bytes, got more"
         raise _wrong(name, what, "check whether this is the right file")
     try:
         text = data.decode("utf-8-sig")

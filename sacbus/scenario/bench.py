@@ -1,0 +1,196 @@
+"""One bus of a scenario as it is played on: mother, the line, and what can be done to its nodes.
+
+Owns the difference between a bus that is hosted here, whether in virtual or real time, and one at
+the far end of a link, of which only the line can be seen.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import Final
+
+from sacbus.bus import Port
+from sacbus.bus.transmission import Transmission
+from sacbus.hosted import HostedBus
+from sacbus.kernel import MS, LineRate, Ns
+from sacbus.links import Line as Link
+from sacbus.mother import Caller, Clock
+from sacbus.node import Heard, Protocol, Report, ReportKind
+from sacbus.panel import Panel
+from sacbus.scenario.line import Line, Passed
+from sacbus.scenario.tape import Tape
+
+__all__ = ["Bench", "far_bench", "hosted_bench", "piped_bench"]
+
+#: How often something is looked at that tells nobody when it changes.
+LOOK: Final[Ns] = 1 * MS
+
+#: Warnings that are kept in words.
+KEPT: Final = 4
+
+
+class Bench:
+    """One bus under a scenario. Everything is called at the time of ``clock``.
+
+    ``talk`` puts bytes on the line as they are; ``unsent`` tells how many of them wait for it.
+    ``hosted`` is None where only the line is there.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        clock: Clock,
+        protocol: Protocol,
+        talk: Callable[[bytes], None],
+        unsent: Callable[[], int],
+        span: Callable[[int], Ns],
+    ) -> None:
+        self.name = name
+        self.clock = clock
+        self.line = Line(protocol)
+        self.talk = talk
+        self.unsent = unsent
+        self.span = span
+        self.caller: Caller
+        self.hosted: HostedBus | None = None
+        self.look: Ns = LOOK
+        #: By the addresses of the configuration, whatever a node is called by now.
+        self.panels: dict[int, Panel] = {}
+        #: Called after something was said on the line, or done to nodes.
+        self.stirred: list[Callable[[], object]] = []
+        self.shown: dict[int, bytearray] = {}
+        self.warnings: Counter[int | None] = Counter()
+        #: The last of them in words, with the time of each.
+        self.warned: deque[tuple[Ns, str]] = deque(maxlen=KEPT)
+        self.origin: Ns = 0
+        #: What is recorded of it; None where nothing is.
+        self.tape: Tape | None = None
+        self._collided_before = 0
+
+    def begin(self, origin: Ns) -> None:
+        """The scenario begins now, which is its time 0."""
+        self.origin = origin
+        self.warnings.clear()
+        self.warned.clear()
+        self._collided_before = self._collided()
+
+    def stir(self) -> None:
+        """Something was said or done: who waits for what may come of it looks again."""
+        for stirred in tuple(self.stirred):
+            stirred()
+
+    def counts(self, nodes: tuple[int, ...] | None = None) -> dict[str, int]:
+        """What has been counted of these nodes, or of all, since the beginning."""
+        table = self.caller.statistics
+        chosen = [one for address, one in table.items() if nodes is None or address in nodes]
+        if nodes is None:
+            warnings = self.warnings.total()
+        else:
+            warnings = sum(self.warnings[address] for address in nodes)
+        return {
+            "acks": sum(one.acks for one in chosen),
+            "naks": sum(one.naks for one in chosen),
+            "timeouts": sum(one.timeouts for one in chosen),
+            "retries": sum(one.retries for one in chosen),
+            "collisions": self._collided() - self._collided_before,
+            "warnings": warnings,
+        }
+
+    def busy(self, now: Ns) -> bool:
+        """Whether anything is on the line; False where that cannot be known."""
+        if self.hosted is None:
+            return False
+        medium = self.hosted.bus.medium
+        return any((medium.free_at(lane) or 0) > now for lane in range(medium.lanes))
+
+    def listen(self, address: int) -> bytearray:
+        """What a terminal has shown since the last that was taken from here."""
+        shown = self.shown.get(address)
+        if shown is None:
+            shown = self.shown[address] = bytearray()
+            console = self.panels[address].console
+            assert console is not None, "the rules have looked for a terminal"
+            console.watch(shown.extend)
+        return shown
+
+    def _collided(self) -> int:
+        if self.hosted is None:
+            return 0
+        medium = self.hosted.bus.medium
+        return sum(medium.counters(lane).collided for lane in range(medium.lanes))
+
+
+def hosted_bench(hosted: HostedBus) -> Bench:
+    """A bus in this process, with mother at no distance from its line."""
+    kernel, bus = hosted.host.kernel, hosted.bus
+
+    def hear(heard: Heard, _now: Ns) -> None:
+        bench.caller.hear(heard.data)
+
+    port = Port(bus.medium, hear, latency=0, name="mother")
+    bench = Bench(bus.name, kernel, bus.protocol, port.talk, lambda: port.unsent, bus.rate.span)
+    bench.caller = Caller(kernel, port.talk, rate=bus.rate, unsent=lambda: port.unsent)
+    _watch(bench, hosted)
+    return bench
+
+
+def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
+    """A bus in this process, with mother at the far end of one of its links, in real time."""
+    kernel, bus = hosted.host.kernel, hosted.bus
+    bench = Bench(bus.name, kernel, bus.protocol, link.send, lambda: 0, bus.rate.span)
+    bench.caller = Caller(kernel, link.send, rate=bus.rate, slack=slack)
+    _watch(bench, hosted)
+    link.start(
+        lambda data: hosted.host.arrive(bench.caller.hear, data),
+        lambda why: hosted.host.arrive(bench.caller.lose, why),
+    )
+    return bench
+
+
+def far_bench(
+    name: str, clock: Clock, protocol: Protocol, link: Link, rate: LineRate, slack: Ns
+) -> Bench:
+    """A line at the far end of a link: what comes back is all that can be seen of it."""
+
+    def send(data: bytes) -> None:
+        link.send(data)
+        now = clock.now
+        bench.line.note(Passed(now, now + rate.span(len(data)), 0, "mother", data))
+
+    def hear(data: bytes) -> None:
+        now = clock.now
+        bench.line.note(Passed(max(now - rate.span(len(data)), 0), now, 0, "line", data))
+        bench.caller.hear(data)
+
+    bench = Bench(name, clock, protocol, send, lambda: 0, rate.span)
+    bench.caller = Caller(clock, send, rate=rate, slack=slack)
+    link.start(hear, bench.caller.lose)
+    return bench
+
+
+def _watch(bench: Bench, hosted: HostedBus) -> None:
+    bus = hosted.bus
+    seed = bus.medium.seed
+    line = bench.line
+    bench.hosted = hosted
+    for at in hosted.configuration.every_node:
+        bench.panels[at.address] = hosted.panel(at.address)
+    named = {id(panel.node): address for address, panel in bench.panels.items()}
+
+    def over(sent: Transmission) -> None:
+        sender = sent.sender
+        who = named.get(id(sender)) or str(getattr(sender, "name", "line"))
+        data = sent.data
+        if sent.hits is not None or sent.passage is not None:
+            data = sent.outcome(seed)
+        line.note(Passed(sent.start, sent.end, sent.lane, who, data, sent.collided, sent.faults))
+        bench.stir()
+
+    def report(told: Report) -> None:
+        if told.kind is ReportKind.WARNING:
+            bench.warnings[told.address] += 1
+            bench.warned.append((told.when, str(told)))
+
+    bus.medium.watchers.append(over)
+    bus.report_watchers.append(report)

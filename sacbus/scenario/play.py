@@ -1,0 +1,319 @@
+"""A scenario as it is played: which step begins when, and what becomes of each.
+
+Owns the order of the steps and the gathering of failures. Synchronous: it is called by the clock of
+its benches, the same in virtual time, in real time and over a link; ``run.py`` moves that clock.
+
+A step begins by an event of its own, after whatever made it begin has been dealt with to its end.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from sacbus.bus import FaultOn
+from sacbus.kernel import SECOND, Ns
+from sacbus.mother import (
+    Acknowledged,
+    MotherError,
+    Sent,
+    addressed_line,
+)
+from sacbus.scenario.asking import Polling, ask, outcome_of, told
+from sacbus.scenario.bench import Bench
+from sacbus.scenario.expectations import Counted, Shown
+from sacbus.scenario.judges import judge
+from sacbus.scenario.result import Failure, Result
+from sacbus.scenario.values import (
+    Disturb,
+    Lift,
+    Mark,
+    Pause,
+    Pin,
+    Poll,
+    Power,
+    Raw,
+    Scenario,
+    Send,
+    Step,
+    Turn,
+    Type,
+)
+
+__all__ = ["Play", "predecessor"]
+
+
+def predecessor(steps: tuple[Step, ...], index: int) -> int | None:
+    """The step whose end a step waits for; None for one that begins by the clock or with the play.
+
+    A name is that of the nearest step above; or else of the first one below.
+    """
+    step = steps[index]
+    if step.at is not None:
+        return None
+    if not isinstance(step.after, str):
+        return index - 1 if index else None
+    order = [*range(index - 1, -1, -1), *range(index + 1, len(steps))]
+    return next((other for other in order if steps[other].name == step.after), None)
+
+
+class Play:
+    """One run of a scenario on its benches, by the names of the buses; the first is the default."""
+
+    def __init__(self, scenario: Scenario, benches: Mapping[str, Bench]) -> None:
+        self.result = Result(scenario)
+        self.over = False
+        #: Called once, when it is over.
+        self.when_over: Callable[[], object] | None = None
+        self._scenario = scenario
+        self._benches = benches
+        self._first = next(iter(benches.values()))
+        self._clock = self._first.clock
+        self._origin: Ns = 0
+        self._followers: defaultdict[int, list[int]] = defaultdict(list)
+        #: The faults that are on, by the names of the steps that put them on.
+        self._faults: defaultdict[str, list[FaultOn]] = defaultdict(list)
+        self._open = set(range(len(scenario.steps)))
+        #: Polls that go on to the end.
+        self._background: set[int] = set()
+
+    def begin(self) -> None:
+        """Time 0 is now."""
+        self._origin = self._clock.now
+        for bench in self._benches.values():
+            bench.begin(self._origin)
+        steps = self._scenario.steps
+        for index, step in enumerate(steps):
+            for deed in (step.does, step.after):
+                if isinstance(deed, Shown):
+                    self._bench(deed.bus).listen(deed.node)
+            before = predecessor(steps, index)
+            if before is not None:
+                self._followers[before].append(index)
+            else:
+                begin = self._origin + (step.at or 0) + step.wait
+                self._clock.at(begin, self._meet, index, begin)
+        if self._scenario.end is not None:
+            self._clock.at(self._origin + self._scenario.end, self._end)
+        elif not steps:
+            self._end()
+
+    # ---- the order of steps ----
+
+    def _meet(self, index: int, since: Ns) -> None:
+        """A step's time has come, which was ``since``; what it waits for first may not have."""
+        if self.over:
+            return
+        step = self._scenario.steps[index]
+        if step.after is None or isinstance(step.after, str):
+            self._do(index, since)
+            return
+
+        def met(got: str | None) -> None:
+            if got is None:
+                now = self._clock.now
+                self._clock.at(now, self._do, index, now)
+            else:
+                self._settle(index, str(step.after), got)
+
+        judge(step.after, self._bench(step.after.bus), met).begin(since)
+
+    def _do(self, index: int, since: Ns) -> None:
+        if self.over:
+            return
+        step = self._scenario.steps[index]
+        match step.does:
+            case Send() as send:
+                self._send(index, send, 0)
+            case Poll() as poll:
+                self._begin_poll(index, poll)
+            case Raw(data, bus):
+                bench = self._bench(bus)
+                bench.talk(data)
+                self._out_at(self._clock.now + bench.span(len(data)), index, bench)
+            case Disturb(fault, bus):
+                hosted = self._bench(bus).hosted
+                assert hosted is not None, "the rules have looked"
+                self._faults[step.name].append(hosted.fault(fault))
+                self._settle(index)
+            case Lift(name):
+                for on in self._faults.pop(name, ()):
+                    on.off()
+                self._settle(index)
+            case Mark(text):
+                if self._first.tape is not None:
+                    self._first.tape.recorder.mark(text)
+                self._settle(index)
+            case Pause():
+                self._settle(index)
+            case Type() | Pin() | Turn() | Power() as deed:
+                self._handle(deed)
+                self._settle(index)
+            case expected:
+                self.result.expectations += 1
+                wanted = str(expected)
+                verdict = partial(self._settle, index, wanted)
+                judge(expected, self._bench(expected.bus), verdict).begin(since)
+
+    def _handle(self, deed: Type | Pin | Turn | Power) -> None:
+        bench = self._bench(deed.bus)
+        for address in deed.nodes:
+            panel = bench.panels[address]
+            match deed:
+                case Type(keys=keys):
+                    assert panel.console is not None, "the rules have looked for a terminal"
+                    panel.console.type(keys)
+                case Pin(levels=levels):
+                    for pin, level in levels.items():
+                        panel.drive(pin, level)
+                case Turn(detents=detents):
+                    panel.turn(detents)
+                case Power(on=on):
+                    panel.power(on=on)
+        bench.stir()
+
+    def _settle(
+        self, index: int, expected: str = "", got: str | None = None, at: Ns | None = None
+    ) -> None:
+        """A step is over, and what came of it if that was not as expected.
+
+        ``at``: when it was over, if that has been noticed late, as in real time it is.
+        """
+        if index not in self._open or self.over:
+            return
+        if got is not None:
+            self._fail(index, expected, got)
+        self._open.discard(index)
+        self._release(index, self._clock.now if at is None else at)
+
+    def _release(self, index: int, at: Ns) -> None:
+        for follower in self._followers[index]:
+            begin = at + self._scenario.steps[follower].wait
+            self._clock.at(begin, self._meet, follower, begin)
+        if self._open <= self._background and self._scenario.end is None:
+            self._clock.at(at, self._end)
+
+    def _end(self) -> None:
+        if self.over:
+            return
+        for index in sorted(self._open - self._background):
+            what = self._scenario.steps[index].does
+            self._fail(index, f"{_called(what)} to be over by the end", "that it was not")
+        self.over = True
+        self.result.ended = self._clock.now - self._origin
+        self.result.counts = {name: bench.counts() for name, bench in self._benches.items()}
+        if self.when_over is not None:
+            self.when_over()
+
+    def _fail(self, index: int, expected: str, got: str) -> None:
+        step = self._scenario.steps[index]
+        bench = self._bench(getattr(step.does, "bus", ""))
+        self.result.failures.append(
+            Failure(
+                self._clock.now - self._origin,
+                expected,
+                got,
+                step.name,
+                step.place,
+                bench.line.words(self._origin),
+                self._states(bench, step.does),
+            )
+        )
+
+    def _states(self, bench: Bench, deed: object) -> tuple[str, ...]:
+        """The nodes that a step is about, as they are now; the last warnings if it counts them."""
+        nodes = getattr(deed, "nodes", None) or ()
+        found = []
+        if isinstance(deed, Counted) and "warnings" in deed.counts:
+            for when, text in bench.warned:
+                found.append(f"{(when - self._origin) / SECOND:.6f} s  {text}")
+        for address in nodes[:4]:
+            if address in bench.panels:
+                seen = bench.panels[address].snapshot()
+                command = f", {seen.current}" if seen.current else ""
+                found.append(
+                    f"node {address}: {seen.state} at {seen.position_steps:g}, "
+                    f"{seen.rpm:g} RPM{command}"
+                )
+        return tuple(found)
+
+    def _bench(self, name: str) -> Bench:
+        return self._benches[name] if name else self._first
+
+    # ---- mother ----
+
+    def _send(self, index: int, send: Send, number: int) -> None:
+        bench = self._bench(send.bus)
+        line = send.lines[number]
+
+        def done(outcome: Acknowledged | Sent | MotherError) -> None:
+            if self.over:
+                return
+            got = outcome_of(outcome)
+            self._record(bench, line, outcome, got)
+            if send.outcome not in ("any", got):
+                self._settle(index, f"{line!r} to end in {send.outcome}", told(outcome))
+            elif number + 1 < len(send.lines):
+                self._send(index, send, number + 1)
+            else:
+                self._settle(index)
+
+        ask(bench, line, done, accept_duplicates=send.accept_duplicates)
+
+    def _record(
+        self, bench: Bench, line: str, outcome: Acknowledged | Sent | MotherError, told: str
+    ) -> None:
+        if bench.tape is None:
+            return
+        node, command = addressed_line(line)
+        bench.tape.recorder.outcome(
+            node,
+            command.encode("latin-1"),
+            "sent" if isinstance(outcome, Sent) else told,
+            getattr(outcome, "attempts", 1),
+            bus=bench.tape.number(bench.name),
+        )
+
+    def _begin_poll(self, index: int, poll: Poll) -> None:
+        polling = Polling(self._bench(poll.bus), poll, partial(self._poll_failed, index))
+        self._background.add(index)
+        polling.begin(lambda: not self.over)
+        if poll.lasting is not None:
+            self._background.discard(index)
+            self._clock.at(self._clock.now + poll.lasting, self._poll_over, index, polling)
+        else:
+            self._release(index, self._clock.now)
+
+    def _poll_failed(self, index: int, expected: str, got: str) -> None:
+        if not self.over:
+            self._fail(index, expected, got)
+
+    def _poll_over(self, index: int, polling: Polling) -> None:
+        polling.stop()
+        self._settle(index)
+
+    def _out_at(self, when: Ns, index: int, bench: Bench) -> None:
+        """Raw bytes should be out then; they are not while the line was taken."""
+
+        def out() -> None:
+            now = self._clock.now
+            if waiting := bench.unsent():
+                self._out_at(now + bench.span(waiting), index, bench)
+            elif bench.busy(now):
+                self._out_at(now + bench.span(1), index, bench)
+            else:
+                self._settle(index, at=when)
+
+        self._clock.at(when, out)
+
+
+def _called(deed: object) -> str:
+    """What a step is called where it has not come about."""
+    match deed:
+        case Send(lines=lines) | Poll(lines=lines):
+            return f"{lines[0]!r}"
+        case Raw() | Type() | Pin() | Turn() | Power() | Disturb() | Lift() | Pause() | Mark():
+            return f"the {type(deed).__name__.lower()}"
+        case _:
+            return str(deed)

@@ -1,0 +1,42 @@
+"""The recording of a scenario while it is played: written on, and read by expectations of motion.
+
+Owns the file that both share. Reading begins at its beginning each time, so what is asked of the
+motion costs more the later it is asked.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import BinaryIO
+
+from sacbus.hosted import HostedBus
+from sacbus.trace import Recorder, Recording, Track, read
+
+__all__ = ["Tape"]
+
+
+class Tape:
+    """Records buses into ``file``, which is open for reading and writing, until it is closed."""
+
+    def __init__(self, buses: Sequence[HostedBus], file: BinaryIO) -> None:
+        self.recorder = Recorder(buses, file)
+        self._numbers = {bus.configuration.name: number for number, bus in enumerate(buses)}
+        self._file = file
+
+    def number(self, bus: str) -> int:
+        """The number of a bus in the recording."""
+        return self._numbers[bus]
+
+    def tracks(self, bus: str) -> Mapping[int, Track]:
+        """Where the nodes of a bus have been until now, by their configured addresses."""
+        self.recorder.flush()
+        wanted = self._numbers[bus]
+        tracks = read(self._file).tracks
+        self._file.seek(0, os.SEEK_END)
+        return {address: track for (number, address), track in tracks.items() if number == wanted}
+
+    def close(self) -> Recording:
+        """End the recording and give it."""
+        self.recorder.close()
+        return read(self._file)

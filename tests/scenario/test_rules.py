@@ -1,0 +1,104 @@
+"""Scenarios of plain Python that cannot be played, and what a line alone cannot show."""
+
+from __future__ import annotations
+
+import pytest
+
+from sacbus.bus import Dead
+from sacbus.config import ConfigError
+from sacbus.configuration import Configuration
+from sacbus.kernel import SECOND
+from sacbus.node import SettingError
+from sacbus.scenario import (
+    Bounds,
+    Counted,
+    Disturb,
+    NodeIs,
+    PacketSeen,
+    Pin,
+    Power,
+    Raw,
+    Scenario,
+    Send,
+    Shown,
+    Silent,
+    Step,
+    Straight,
+    Turn,
+    Type,
+    run,
+)
+from sacbus.scenario.rules import refuse
+from sacbus.scenario.values import Deed
+
+BUS = Configuration(nodes=(10, 11))
+
+
+def refusals(*steps: Step | Deed, line_only: bool = False) -> list[str]:
+    made = tuple(one if isinstance(one, Step) else Step(one) for one in steps)
+    with pytest.raises(ConfigError) as wrong:
+        refuse(Scenario("x", (BUS,), made), line_only=line_only)
+    return [str(one) for one in wrong.value.mistakes]
+
+
+def test_a_scenario_of_python_is_refused_with_its_title_and_the_step() -> None:
+    assert refusals(Send(("10m1",)), NodeIs((12,)), Step(Raw(b""), at=-1)) == [
+        "steps[1].expect: expected nodes of bus 'bus' (10-11), got 12, 'x', correct it",
+        "steps[2].at: expected a time from 0 on, got a negative one, 'x', correct it",
+        "steps[2].raw: expected one byte at least, got none, 'x', give some",
+    ]
+
+
+def test_what_stands_in_a_file_is_refused_with_its_line() -> None:
+    (told,) = refusals(Step(Turn((12,), 1), place="two.toml:7"))
+    assert told == "turn: expected nodes of bus 'bus' (10-11), got 12, two.toml:7, correct it"
+
+
+def test_it_is_refused_before_anything_is_played() -> None:
+    with pytest.raises(ConfigError, match="expected one bus at least, got none"):
+        run(Scenario("x", (), ()))
+    with pytest.raises(SettingError, match="addresses from 4 to 255"):
+        run(Scenario("x", (Configuration(nodes=(1,)),), ()))
+
+
+@pytest.mark.parametrize(
+    ("deed", "what"),
+    [
+        (Type((10,), "q"), "keys at a terminal"),
+        (Pin((10,), {"sync": 0}), "pins"),
+        (Turn((10,), 1), "an encoder"),
+        (Power((10,), on=False), "a power switch"),
+        (Disturb(Dead(10)), "faults of the line"),
+        (NodeIs((10,), position=Bounds.exactly(1)), "the position of a node"),
+        (NodeIs((10,), state="OFF"), "the state of a node"),
+        (NodeIs((10,), pins={"clk": 1}), "pins"),
+        (Straight((10, 11), 1), "the motion of nodes"),
+        (Shown(10, "x"), "a terminal"),
+        (Silent(SECOND, 10), "the silence of one node among others"),
+        (Counted({"collisions": Bounds.exactly(0)}), "a count of collisions"),
+    ],
+    ids=repr,
+)
+def test_what_takes_more_than_a_line_is_refused_for_a_link(deed: Deed, what: str) -> None:
+    assert refusals(Send(("10m1",)), deed, line_only=True) == [
+        (
+            f"steps[1]: expected what a line can show, got {what}, 'x', "
+            "leave it out, or play it without --link"
+        )
+    ]
+
+
+def test_what_a_line_can_show_is_taken_for_a_link() -> None:
+    steps = (
+        Step(Send(("10m1",))),
+        Step(Raw(b"x"), after=PacketSeen("ack", source=10, within=SECOND)),
+        Step(Silent(SECOND)),
+        Step(Counted({"retries": Bounds.exactly(0), "acks": Bounds.exactly(1)})),
+    )
+    refuse(Scenario("x", (BUS,), steps), line_only=True)
+
+
+def test_two_buses_are_no_line() -> None:
+    two = (BUS, Configuration(name="b"))
+    with pytest.raises(ConfigError, match="expected one bus to play on a link, got 2"):
+        refuse(Scenario("x", two, ()), line_only=True)

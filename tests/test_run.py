@@ -1,0 +1,225 @@
+"""``sacbus run``: verdicts, statuses, and every mistake in one line each."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from sacbus.cli import run
+from sacbus.trace import read
+from tests.serving import PATIENCE, served, started
+
+Captured = pytest.CaptureFixture[str]
+
+PASSES = """
+title = "a move"
+[parameters]
+steps = 40
+[[bus]]
+[[bus.nodes]]
+address = 10
+[[step]]
+send = "10m{steps}v300"
+[[step]]
+expect = { node = 10, position = 40, state = "STANDBY", within = "2 s" }
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "x.toml"
+    path.write_text(PASSES)
+    return path
+
+
+def test_what_passes_is_told_in_a_line(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file)]) == 0
+    out, err = capsys.readouterr()
+    assert out == f"passed {file}: a move, 0.682769 s\n"
+    assert err == ""
+
+
+def test_what_fails_is_told_with_time_expected_and_got_and_the_last_packets(
+    file: Path, capsys: Captured
+) -> None:
+    assert run(["run", str(file), "--set", "steps=39"]) == 1
+    out, err = capsys.readouterr()
+    assert out.splitlines() == [
+        f"FAILED {file}: a move, 2.004838 s",
+        (
+            f"  {file}:10: expected node 10: position 40, state STANDBY within 2 s, "
+            "got position 39, state STANDBY, at 2.004838 s"
+        ),
+        "      0.000000 s  mother: to 10 'm39v300', move 39 full steps at 300 RPM",
+        "      0.003796 s  10: ACK to 1",
+        "      node 10: STANDBY at 39, 0 RPM",
+    ]
+    assert err == ""
+
+
+def test_cases_have_results_of_their_own(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file), "--set", "steps=[40,41]"]) == 1
+    out, _ = capsys.readouterr()
+    verdicts = [line for line in out.splitlines() if not line.startswith(" ")]
+    assert [line.split(",")[0] for line in verdicts] == [
+        f"passed {file}: a move [steps=40]",
+        f"FAILED {file}: a move [steps=41]",
+    ]
+
+
+def test_the_first_that_fails_may_be_the_last(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file), "--set", "steps=[41,40]", "-x"]) == 1
+    assert "steps=40" not in capsys.readouterr().out
+
+
+def test_a_word_chooses(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file), "--set", "steps=[40,41]", "-k", "steps=40"]) == 0
+    assert "steps=41" not in capsys.readouterr().out
+    assert run(["run", str(file), "-k", "nothing"]) == 2
+    assert capsys.readouterr().err == (
+        "error: -k: no file, title or case has 'nothing' in it, see sacbus run --help\n"
+    )
+
+
+def test_mistakes_of_all_files_are_told_and_nothing_is_played(
+    file: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text('[[bus]]\n[[step]]\nsend = "10m1"\n')
+    missing = tmp_path / "missing.toml"
+    assert run(["run", str(file), str(wrong), str(missing)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.splitlines() == [
+        (
+            "error: step[0].send: expected nodes of bus 'bus' (it has none), got 10, "
+            f"{wrong}:3, correct it"
+        ),
+        (
+            f"error: cannot read the scenario (No such file or directory), {missing}, "
+            "check the path and its permissions"
+        ),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--real", "--link", "x"], "expected --real or --link, got both"),
+        (["--speed", "2"], "--speed: expected only with --real"),
+        (["--set", "steps"], "Invalid value for '--set': expected NAME=VALUE, got 'steps'"),
+        (
+            ["--set", "steps=[1,2]", "--record", "x"],
+            "--record: expected one scenario of one case, got 2, use -k or --set",
+        ),
+        (
+            ["--link", "x", "--record", "y"],
+            "--record: expected a bus in this process, got --link, see sacbus monitor",
+        ),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(
+    file: Path, capsys: Captured, arguments: list[str], told: str
+) -> None:
+    assert run(["run", str(file), *arguments]) == 2
+    assert capsys.readouterr().err == f"error: {told}, see sacbus run --help\n"
+
+
+def test_a_parameter_that_is_not_there_is_a_mistake(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file), "--set", "step=1"]) == 2
+    assert capsys.readouterr().err == (
+        f"error: parameters: unknown parameter 'step', {file}:3, known here: steps\n"
+    )
+
+
+def test_results_as_json_and_junit(file: Path, tmp_path: Path, capsys: Captured) -> None:
+    xml = tmp_path / "r.xml"
+    arguments = ["--set", "steps=[40,41]", "--json", "--junit", str(xml)]
+    assert run(["run", str(file), *arguments]) == 1
+    passed, failed = json.loads(capsys.readouterr().out)["scenarios"]
+    assert (passed["passed"], passed["case"], passed["failures"]) == (True, {"steps": 40}, [])
+    assert passed["counts"]["bus"]["acks"] == 1
+    (failure,) = failed["failures"]
+    assert (failure["place"], failure["got"]) == (f"{file}:10", "position 41, state STANDBY")
+    root = ET.parse(xml).getroot()  # noqa: S314 (our own)
+    assert (root.get("tests"), root.get("failures")) == ("2", "1")
+
+
+def test_a_recording_is_kept(file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "r.jsonl"
+    assert run(["run", str(file), "--record", str(path)]) == 0
+    assert read(path).track(10).position(10**10) == 40
+
+
+def test_a_scenario_that_takes_more_than_a_line_is_refused_before_the_link_is_opened(
+    file: Path, capsys: Captured
+) -> None:
+    assert run(["run", str(file), "--link", "/nowhere/at/all"]) == 2
+    assert capsys.readouterr().err == (
+        f"error: step: expected what a line can show, got the position of a node, {file}:10, "
+        "leave it out, or play it without --link\n"
+    )
+
+
+def test_a_capture_is_written_with_or_without_a_recording(file: Path, tmp_path: Path) -> None:
+    alone, beside = tmp_path / "a.pcapng", tmp_path / "b.pcapng"
+    assert run(["run", str(file), "--pcap", str(alone)]) == 0
+    assert run(["run", str(file), "--pcap", str(beside), "--record", str(tmp_path / "r")]) == 0
+    assert alone.read_bytes() == beside.read_bytes()
+    assert b"\x02\x0a\x01m40v300\x03" in alone.read_bytes()
+
+
+def test_pins_are_written_as_vcd(file: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.vcd"
+    assert run(["run", str(file), "--vcd", str(path)]) == 0
+    assert path.read_text().startswith("$")
+    assert " clk $end" in path.read_text()
+
+
+def test_a_page_that_cannot_be_written_is_one_line(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file), "--record", str(file.parent / "no" / "r")]) == 1
+    assert capsys.readouterr().err == (
+        f"error: No such file or directory, {file.parent / 'no' / 'r'}\n"
+    )
+
+
+@pytest.mark.slow
+def test_standard_input_is_a_scenario_for_a_real_process() -> None:
+    command = [sys.executable, "-m", "sacbus", "run", "-"]
+    ran = subprocess.run(
+        command, input=PASSES, capture_output=True, text=True, check=False, timeout=PATIENCE
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout.startswith("passed standard input: a move, 0.")
+
+
+@pytest.mark.slow
+def test_a_served_bus_is_played_on_over_its_pty(file: Path) -> None:
+    file.write_text(PASSES.replace('node = 10, position = 40, state = "STANDBY"', "acks = 1"))
+    with (
+        served("--nodes", "10") as bus,
+        started("run", str(file), "--link", bus.link) as player,
+    ):
+        assert player.wait() == 0
+    assert player.text.startswith("passed ")
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_a_long_one(file: Path) -> None:
+    file.write_text(
+        '[[bus]]\n[[bus.nodes]]\naddress = 10\n[[step]]\nsend = "10"\nevery = "1 ms"\n'
+        'for = "1000 h"\n'
+    )
+    with started("run", str(file), "--record", str(file.with_suffix(".jsonl"))) as player:
+        recording = file.with_suffix(".jsonl")
+        # It plays once the first second of it is on disk.
+        while not recording.exists() or not recording.stat().st_size:
+            assert player.process.poll() is None
+        assert player.send_signal(signal.SIGINT) == 130
+        assert player.errors().strip() == "interrupted"
