@@ -227,9 +227,12 @@ class _Place:
             f'"is":"sent","start":{sent.start},"lane":{sent.lane},"from":{name},'
             f'"data":"{data.hex()}"'
         )
-        if sent.hits is not None:
-            arrived = sent.arrived(0, len(data), self._seed)
-            text += f',"arrived":"{arrived.hex()}","collided":true'
+        if sent.hits is not None or sent.passage is not None:
+            arrived = sent.outcome(self._seed)
+            if arrived != data:
+                text += f',"arrived":"{arrived.hex()}"'
+            if sent.collided:
+                text += ',"collided":true'
         if sent.ninth is not None:
             text += f',"ninth":"{sent.ninth.hex()}"'
         self.add(text)
