@@ -60,7 +60,8 @@ class Predicted:
         self.everybody = 0.0
         #: Another line than was sent, with a CRC that is right for it.
         self.undetected = 0.0
-        #: The verdict byte became 00, or 03 (then the NUL behind it is taken for the verdict).
+        #: The verdict byte became 00, or 03 (then the NUL behind it is taken for the verdict), and
+        #: the line is that which was sent, or another.
         self.unchecked = 0.0
         self.unchecked_wrong = 0.0
         for (node, body), count in packets.items():
@@ -89,6 +90,10 @@ class Predicted:
             # Bytes that would end the packet, or begin another.
             damaged *= 1 - sum(turns(byte, end, p) for end in (STX, ETX, ACK))
         self.unchecked_wrong += count * framing * there * (damaged - text) * blind
+        # Or ETX became a character of the body, and the verdict byte, as 03, stands for it.
+        longer = 1 - sum(turns(ETX, end, p) for end in (STX, ETX, ACK))
+        late = longer / whole**8 * turns(verdict, ETX, p) * whole**8
+        self.unchecked_wrong += count * framing * there * damaged * late
 
 
 def bound(expected: float, chance: float = 1e-3) -> tuple[int, int]:

@@ -125,7 +125,9 @@ class Study:
 
     def _judge(self, node: int, line: bytes) -> None:
         """What became of a packet that did not arrive as sent, by what the nodes tell."""
-        counts, sent = self.counts, self.trace[0]
+        counts = self.counts
+        # Somebody who took the noise before it for a packet may have begun to answer first.
+        sent = next(one for one in self.trace if one.sender is self._port)
         if not self.account:
             counts["refused" if self.heard == nak(MOTHER, node) else "lost"] += 1
             return
@@ -136,7 +138,8 @@ class Study:
             counts["unknown"] += self.heard != ack(MOTHER, node)
             return
         counts["by others"] += sum(address != node for address, _, _ in self.account)
-        counts["visible"] += arrived[part] != sent.data[part]
+        counts["visible"] += arrived != sent.data
+        counts["there"] += arrived[part] != sent.data[part]
         self.wrong.append(
             f"{kind}: sent {sent.data.hex(' ')}, arrived {arrived.hex(' ')}, "
             f"{len(self.account)} x {self.account[0][2]!r}"
@@ -215,7 +218,10 @@ def main(argv: list[str] | None = None) -> int:
     counts = study.counts
     print(f"refused with NAK {counts['refused']}, lost in silence {counts['lost']}")
     print(f"executions by nodes that were not meant {counts['by others']}")
-    print(f"wrong or unchecked {len(study.wrong)}, visible in the trace {counts['visible']}")
+    print(
+        f"wrong or unchecked {len(study.wrong)}, damage visible in the trace {counts['visible']}, "
+        f"where the class says {counts['there']}"
+    )
     right, wrong, strange = study.motors()
     print(
         f"motors that stand where the lines bring them {right}, elsewhere {wrong}, "

@@ -122,11 +122,11 @@ def _open_terminals(bus: HostedBus) -> None:
 
     # One for all: a user may have 128 of what it takes, and a bus 250 nodes.
     presence = Presence()
-    for node in bus.configuration.every_node:
-        path = terminal_path(bus.configuration.links, node.address)
+    for wanted, node in zip(bus.configuration.every_node, bus.bus.nodes, strict=True):
+        if node.terminal is None:
+            what = f"a node of kind {wanted.kind} has no terminal port, so none is served"
+            bus.bus.tell(Report(bus.now(), wanted.address, ReportKind.WARNING, what))
+            continue
+        path = terminal_path(bus.configuration.links, wanted.address)
         link = PtyLink(path, baud=bus.bus.rate.baud, presence=presence)
-        try:
-            bus.attach_terminal(node.address, link)
-        except KeyError:
-            what = f"a node of kind {node.kind} has no terminal port, so none is served"
-            bus.bus.tell(Report(bus.now(), node.address, ReportKind.WARNING, what))
+        bus.attach_terminal(wanted.address, link)

@@ -5,6 +5,7 @@ Owns how a result is put on disk: written beside its place under another name, t
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from collections.abc import Iterator
@@ -35,10 +36,16 @@ def fresh_file(path: Path) -> Iterator[BinaryIO]:
             shutil.copymode(place, beside)
         beside.replace(place)
     except OSError as fault:
-        beside.unlink(missing_ok=True)
-        if fault.filename == str(beside):
+        _remove(beside)
+        if fault.filename in (str(beside), str(place)):
             raise OSError(fault.errno, fault.strerror, str(path)) from fault
         raise
     except BaseException:
-        beside.unlink(missing_ok=True)
+        _remove(beside)
         raise
+
+
+def _remove(beside: Path) -> None:
+    """Take away what is not whole, if that can be: what went wrong before is worth telling."""
+    with contextlib.suppress(OSError):
+        beside.unlink(missing_ok=True)

@@ -22,7 +22,7 @@ from sacbus.links.link import Server
 from sacbus.mother import Mother
 from sacbus.node import BOOT, Heard, Node, Report, ReportKind, Snapshot
 from sacbus.panel import Deed, Panel
-from sacbus.saving import AtOnce, Saving, Thread
+from sacbus.saving import AtOnce, Saving, Soon
 from sacbus.state import StateDirectory, StateError
 
 __all__ = ["HostedBus"]
@@ -252,7 +252,7 @@ class HostedBus:
             self.bus.tell(Report(self.now(), address, ReportKind.WARNING, text))
 
         virtual = isinstance(self.host, VirtualHost)
-        saving = AtOnce(state, failed) if virtual else Thread(state, failed)
+        saving = AtOnce(state, failed) if virtual else Soon(state, failed)
         for wanted, node in self.configured:
             node.memory_changed = partial(_save, saving, wanted, node)
 

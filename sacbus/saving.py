@@ -13,9 +13,9 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from sacbus.state import StateDirectory, StateError
+from sacbus.state import StateDirectory
 
-__all__ = ["AtOnce", "Saving", "Thread"]
+__all__ = ["AtOnce", "Saving", "Soon"]
 
 Memory = Mapping[str, object]
 
@@ -34,14 +34,14 @@ class AtOnce:
         """Write it now; ``failed`` is told if it cannot be."""
         try:
             self._state.save(address, kind, memory)
-        except StateError as fault:
+        except OSError as fault:  # StateError is one; no other may end the saving either
             self._failed(address, str(fault))
 
     def close(self) -> None:
         """Nothing is left to do."""
 
 
-class Thread:
+class Soon:
     """Writes in a thread of its own, which begins with the first save.
 
     Of several memories of one node that wait, the newest is written: each file goes from one of
@@ -92,4 +92,4 @@ class Thread:
             self._loop.call_soon_threadsafe(self._failed, address, text)
 
 
-Saving = AtOnce | Thread
+Saving = AtOnce | Soon

@@ -7,6 +7,7 @@ with factory values, as a device with a worn EEPROM would.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
@@ -88,7 +89,10 @@ class StateDirectory:
         return None, f"EEPROM file {path}: {wrong}; kept as {aside.name}, factory values used"
 
     def save(self, address: int, kind: str, memory: Mapping[str, object]) -> None:
-        """Write a memory; whatever happens, the file is either the old or the new one."""
+        """Write a memory; whatever happens, the file is either the old or the new one.
+
+        StateError when it cannot be written, whatever is wrong with the directory.
+        """
         path = self.path(address)
         content = _encode(kind, memory)
         if self._holds(path, content):
@@ -102,7 +106,9 @@ class StateDirectory:
                 os.fsync(file.fileno())
             fresh.replace(path)
         except OSError as fault:
-            fresh.unlink(missing_ok=True)
+            # What kept it from being written may keep it from being removed: the next claim will.
+            with contextlib.suppress(OSError):
+                fresh.unlink(missing_ok=True)
             raise self._unusable("write", path, fault) from fault
 
     def _holds(self, path: Path, content: bytes) -> bool:
@@ -120,7 +126,10 @@ class StateDirectory:
         if sys.platform == "win32":
             return
         # The directory itself is locked, so that nothing but memories ever lies in it.
-        lock = os.open(self._place, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            lock = os.open(self._place, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError as fault:  # it may be writable and not readable
+            raise self._unusable("lock", self._place, fault) from fault
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as fault:
@@ -131,7 +140,11 @@ class StateDirectory:
                 f"the nodes' memory is in use by another sacbus, {self._place}, {_CURE}"
             ) from fault
         self._lock = lock
-        self._clear_away()
+        try:
+            self._clear_away()
+        except BaseException:
+            self.release()
+            raise
 
     def _clear_away(self) -> None:
         """Remove what saves left behind that were killed; the directory is ours alone."""

@@ -12,7 +12,7 @@ from sacbus import open_bus
 from sacbus.console import KEPT, WAITING
 from sacbus.daemon import Configuration
 from sacbus.host import run_virtual
-from sacbus.kernel import Kernel, LineRate
+from sacbus.kernel import SECOND, Kernel, LineRate
 from sacbus.language.queue_screen import QueueScreen
 from sacbus.links import LinkError, MemoryLink
 
@@ -169,6 +169,25 @@ def test_a_program_that_writes_without_end_is_held_and_nothing_is_lost() -> None
             await asyncio.sleep(2)
             assert shown.count(b"m1v500\r\nSAC>") == written
             assert 200 < written < 20_000
+
+    virtually(scene())
+
+
+def test_a_program_is_held_while_too_many_of_its_keys_wait_and_let_go_at_half() -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10,))) as bus:
+            link = MemoryLink()
+            bus.attach_terminal(10, link)
+            program = link.client(lambda _: None)
+            assert program.write(b"\r") == 1  # on its way; all others wait behind it
+            assert program.write(b"\r" * WAITING) == WAITING
+            assert program.write(b"\r") == 1  # as many as may wait are no reason yet
+            assert program.write(b"\r") == 0
+            left = WAITING // 2 + 1  # to arrive until no more than half of them wait
+            await asyncio.sleep(left * span(1) / SECOND - 1e-6)
+            assert program.write(b"\r") == 0
+            await asyncio.sleep(2e-6)
+            assert program.write(b"\r") == 1
 
     virtually(scene())
 

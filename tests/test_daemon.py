@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 import threading
 from collections.abc import Callable, Coroutine
 from pathlib import Path
@@ -272,6 +273,20 @@ def test_a_memory_that_cannot_be_saved_is_told_and_the_others_are_saved(tmp_path
         virtually(scene())
     assert (tmp_path / "bus" / "11").is_file()
     assert (tmp_path / "bus" / "12").is_file()
+
+
+def test_a_memory_whose_remains_cannot_be_removed_keeps_no_other_from_being_saved(
+    tmp_path: Path,
+) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(state=tmp_path)):
+            for address in (10, 11, 12):
+                (tmp_path / "bus" / str(address)).unlink()
+            (tmp_path / "bus" / f".10.{os.getpid()}.new").mkdir()
+
+    with pytest.raises(StateError, match="cannot write node memory"):
+        virtually(scene())
+    assert {path.name for path in (tmp_path / "bus").iterdir() if path.is_file()} == {"11", "12"}
 
 
 def test_the_stored_address_wins_and_the_difference_is_told(tmp_path: Path) -> None:

@@ -123,6 +123,15 @@ def test_a_memory_of_a_kind_that_is_not_installed_is_told(tmp_path: Path, capsys
     assert written.err.count("\n") == 1
 
 
+def test_the_help_tells_the_factory_of_the_manual_from_what_a_restore_brings(
+    capsys: Captured,
+) -> None:
+    assert run(["eeprom", "show", "--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "differs from the factory's value is marked: that is the manual's" in told
+    assert "A factory restore brings the values of the node's configuration" in told
+
+
 def test_without_a_command_its_help_is_shown(capsys: Captured) -> None:
     assert run(["eeprom"]) == 2
     written = capsys.readouterr()

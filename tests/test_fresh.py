@@ -68,11 +68,51 @@ def test_a_device_is_written_to_and_stays_a_device(tmp_path: Path) -> None:
         os.close(writer)
 
 
-@pytest.mark.parametrize("place", ["missing/result.csv", "."], ids=["no directory", "directory"])
+@pytest.mark.parametrize(
+    "place",
+    ["missing/result.csv", ".", "file/result.csv"],
+    ids=["no directory", "directory", "in a file"],
+)
 def test_a_place_that_cannot_be_written_is_named_as_it_was_given(
     tmp_path: Path, place: str
 ) -> None:
+    (tmp_path / "file").touch()
     asked = tmp_path / place
     with pytest.raises(OSError) as told, fresh_file(asked):  # noqa: PT011 (which one differs)
         pass
+    assert told.value.filename == str(asked)
+
+
+@pytest.mark.parametrize("fault", [ValueError, KeyboardInterrupt])
+def test_a_failure_is_told_also_where_nothing_can_be_removed(
+    tmp_path: Path, fault: type[BaseException]
+) -> None:
+    directory = tmp_path / "results"
+    directory.mkdir()
+
+    def fail_halfway() -> None:
+        with fresh_file(directory / "result.csv"):
+            directory.rename(tmp_path / "moved")
+            directory.touch()
+            raise fault
+
+    with pytest.raises(fault):
+        fail_halfway()
+
+
+def test_a_directory_that_goes_away_meanwhile_is_told_by_the_name_that_was_given(
+    tmp_path: Path,
+) -> None:
+    directory = tmp_path / "results"
+    directory.mkdir()
+    (tmp_path / "link").symlink_to(directory)
+    asked = tmp_path / "link" / "result.csv"
+
+    def lose_the_directory() -> None:
+        with fresh_file(asked):
+            directory.rename(tmp_path / "moved")
+            directory.touch()
+
+    with pytest.raises(NotADirectoryError) as told:
+        lose_the_directory()
     assert told.value.filename == str(asked)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 from collections.abc import Callable
 from pathlib import Path
 
@@ -57,6 +58,20 @@ def test_a_save_that_fails_leaves_no_piece_of_itself(state: StateDirectory) -> N
     with pytest.raises(StateError, match="cannot write node memory"):
         state.save(10, "sac", MEMORY)
     assert [one.name for one in path.parent.iterdir()] == ["10"]
+
+
+def test_a_save_that_cannot_even_remove_a_piece_of_itself_is_told_as_any_other(
+    state: StateDirectory,
+) -> None:
+    place = state.path(10).parent
+    place.parent.mkdir()
+    place.touch()  # a file, in which there is neither anything to write nor to remove
+    with pytest.raises(StateError, match="cannot write node memory") as told:
+        state.save(10, "sac", MEMORY)
+    assert str(state.path(10)) in str(told.value)
+    place.unlink()
+    state.save(10, "sac", MEMORY)
+    assert state.load(10, "sac") == (MEMORY, None)
 
 
 DAMAGES: dict[str, Callable[[bytes], bytes]] = {
@@ -183,6 +198,40 @@ def test_who_has_not_got_the_directory_clears_nothing_away(
         assert (state.path(10).parent / ".10.4711.new").exists()
     finally:
         state.release()
+
+
+def test_who_cannot_clear_away_has_not_got_the_directory(
+    state: StateDirectory, tmp_path: Path
+) -> None:
+    left = state.path(10).with_name(".10.4711.new")
+    left.mkdir(parents=True)
+    with pytest.raises(StateError, match="cannot clear away unfinished node memory"):
+        state.claim()
+    left.rmdir()
+    another = StateDirectory(tmp_path / "state", "bus")
+    another.claim()
+    another.release()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may read everywhere")
+def test_a_directory_that_cannot_be_read_is_told_before_anything_runs(tmp_path: Path) -> None:
+    (tmp_path / "bus").mkdir(mode=0o300)
+    with pytest.raises(StateError, match="cannot lock node memory"):
+        StateDirectory(tmp_path, "bus").claim()
+
+
+def test_a_directory_that_cannot_be_opened_is_told_before_anything_runs(
+    state: StateDirectory,
+) -> None:
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, before[1]))  # whatever it is that forbids it
+    try:
+        with pytest.raises(StateError, match="cannot lock node memory"):
+            state.claim()
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    state.claim()
+    state.release()
 
 
 # ---- reading a file, wherever it lies -----------------------------------------------------------

@@ -167,6 +167,22 @@ def test_a_node_without_a_terminal_is_told_of_and_served_all_the_same(
     ]
 
 
+def test_a_fault_of_a_link_is_not_taken_for_a_node_without_a_terminal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> None:
+        raise KeyError("a defect of a link")
+
+    monkeypatch.setattr("sacbus.links.PtyLink.open", fail)
+
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10,), terminals=True)):
+            pass
+
+    with pytest.raises(KeyError, match="a defect of a link"):
+        asyncio.run(scene())
+
+
 def test_two_hundred_and_fifty_nodes_have_a_terminal_each(tmp_path: Path) -> None:
     path = tmp_path / "sacbus"
     options = ("--nodes", "4-253", "--pty", str(path), "--ephemeral")
@@ -239,6 +255,19 @@ def test_a_list_of_one_shots_is_typed_from_a_pipe(capsys: Captured) -> None:
         assert sacbus.send_signal(signal.SIGTERM) == 0
         (bus,) = sacbus.read_event("stopped")["buses"]
         assert bus["nodes"][0]["position_steps"] > 0
+
+
+def test_a_line_that_is_too_long_is_answered_without_its_beginning() -> None:
+    with served("--terminals", "--ephemeral") as sacbus:
+        ran = subprocess.run(
+            [sys.executable, "-m", "sacbus", "terminal", terminal(sacbus, 10)],
+            input=b"11 " + b"x" * 60 + b"\nvd\n",
+            capture_output=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+        assert (ran.returncode, ran.stderr) == (0, b"")
+        assert ran.stdout == b"2big.\n100 RPM  cycle 3000\n"
 
 
 def test_a_queue_that_was_typed_is_got_back_one_to_one(capsys: Captured, tmp_path: Path) -> None:

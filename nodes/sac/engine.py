@@ -242,7 +242,9 @@ class Engine:
         self._schedule()
 
     def step(self, pulses: int) -> None:
-        """Single pulses, out of any profile; only while the motor stands."""
+        """Single pulses, out of any profile, in their direction; only while the motor stands."""
+        if pulses:
+            self._sign = 1 if pulses > 0 else -1
         self._rest = Where(*(position + pulses for position in self._rest))
 
     def change_microsteps(self, before: int, after: int) -> None:
@@ -260,7 +262,7 @@ class Engine:
 
     @property
     def clockwise(self) -> bool:
-        """The direction of the last profile; clockwise before the first."""
+        """The direction of the last profile or single pulse; clockwise before the first."""
         return self._sign > 0
 
     def where(self, now: Ns) -> Where:

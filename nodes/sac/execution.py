@@ -134,7 +134,6 @@ class Execution:
         self.gap = True
         self.forget_velocity()
         self._last = None
-        self._free = max(self._free, now)
 
     def set_clock(self, clock: Timebase, now: Ns) -> None:
         """Pulses are timed by another clock from ``now`` on."""

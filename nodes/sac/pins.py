@@ -7,8 +7,8 @@ and its edges are told to nobody.
 A node has this object once somebody asks for it. Until then all inputs are at rest: sync, e-stop,
 RST and the encoder's two high, from their pull-ups, and at xclk the clock that was configured.
 
-Decisions where the manual is silent: dir keeps the direction of the last command to start, and
-clockwise before the first; with ops at 0 both op pins are low.
+Decisions where the manual is silent: dir keeps the direction of the last command to start, or of
+the last single pulse, and clockwise before the first; with ops at 0 both op pins are low.
 Source: manual, "Terminal Connections", "Encoder", "Estop", "cw", "ops", "ustep"; spec, "Pins".
 """
 

@@ -1,5 +1,6 @@
 """The line itself: transmissions, collisions, faults, nodes, ports. Synchronous, in kernel time."""
 
+from sacbus.bus.around import Listener
 from sacbus.bus.bus import Bus
 from sacbus.bus.damage import BitErrors, Delay, Drop, Duplicate, SwappedReply
 from sacbus.bus.disturbers import Babble, NoiseBursts
@@ -7,7 +8,7 @@ from sacbus.bus.fault import Fault, FaultError, FaultOn
 from sacbus.bus.faults import FAULTS, fault_from
 from sacbus.bus.hearing import Cut, Dead, Echo, LateDirection, Latency, WrongBaud
 from sacbus.bus.live_port import LivePort
-from sacbus.bus.medium import LaneCounters, Listener, Medium
+from sacbus.bus.medium import LaneCounters, Medium
 from sacbus.bus.passage import EVERY_LINK, Passage
 from sacbus.bus.port import FULL, LATENCY, PLAIN_BITS, Port
 from sacbus.bus.transmission import Transmission

@@ -23,9 +23,9 @@ from sacbus.cli.eeprom import eeprom_group
 from sacbus.cli.export import export_command
 from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
-from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, verbose
+from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, help_unless_asked, verbose
 from sacbus.cli.plan import plan_command
-from sacbus.cli.queue import queue_command
+from sacbus.cli.queue import queue_group
 from sacbus.cli.run import run_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
@@ -48,11 +48,7 @@ def root(context: click.Context) -> int | None:
     Example: sacbus serve --nodes 10-19 --pty /tmp/sacbus
              sacbus send /tmp/sacbus 10m400
     """
-    if context.invoked_subcommand is not None:
-        return None
-    # Nothing was asked for; whoever wrote this into a script should notice.
-    click.echo(context.get_help(), err=True)
-    return USAGE_STATUS
+    return help_unless_asked(context)
 
 
 for command in (
@@ -62,7 +58,7 @@ for command in (
     monitor_command,
     run_command,
     plan_command,
-    queue_command,
+    queue_group,
     export_command,
     diff_command,
     check_command,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sacbus.cli.options import USAGE_STATUS, verbose
+from sacbus.cli.options import help_unless_asked, verbose
 
 if TYPE_CHECKING:
     from sacbus.node import MemoryTable, MemoryWords
@@ -27,11 +27,7 @@ def eeprom_group(context: click.Context) -> int | None:
     \b
     Example: sacbus eeprom show ~/.local/state/sacbus/bus/10
     """
-    if context.invoked_subcommand is not None:
-        return None
-    # Nothing was asked for; whoever wrote this into a script should notice.
-    click.echo(context.get_help(), err=True)
-    return USAGE_STATUS
+    return help_unless_asked(context)
 
 
 @eeprom_group.command("show")
@@ -41,7 +37,9 @@ def eeprom_group(context: click.Context) -> int | None:
 def show_command(file: Path, as_json: bool) -> int:
     """Show what a node remembers: every parameter with its meaning, pin map, saved queue.
 
-    FILE is ADDRESS in the directory of a bus. What differs from the factory's value is marked.
+    FILE is ADDRESS in the directory of a bus. What differs from the factory's value is marked: that
+    is the manual's, and for d_id the configured address. A factory restore brings the values of the
+    node's configuration, which may be others.
 
     \b
     Example: sacbus eeprom show ~/.local/state/sacbus/bus/10

@@ -15,6 +15,7 @@ __all__ = [
     "USAGE_STATUS",
     "WrongInput",
     "baud",
+    "help_unless_asked",
     "read_addresses",
     "read_endpoints",
     "read_settings",
@@ -46,6 +47,15 @@ def verbose(command: _F) -> _F:
         help="Show the traceback of an error.",
     )
     return option(command)
+
+
+def help_unless_asked(context: click.Context) -> int | None:
+    """What a group does itself: without a command its help, told as an error is; and the status."""
+    if context.invoked_subcommand is not None:
+        return None
+    # Nothing was asked for; whoever wrote this into a script should notice.
+    click.echo(context.get_help(), err=True)
+    return USAGE_STATUS
 
 
 baud = click.option(

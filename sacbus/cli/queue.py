@@ -8,9 +8,9 @@ from pathlib import Path
 
 import click
 
-from sacbus.cli.options import NO_ANSWER_STATUS, USAGE_STATUS, baud, verbose
+from sacbus.cli.options import NO_ANSWER_STATUS, baud, help_unless_asked, verbose
 
-__all__ = ["queue_command"]
+__all__ = ["queue_group"]
 
 STANDARD = "-"
 """The name of standard output."""
@@ -19,19 +19,16 @@ STANDARD = "-"
 @click.group("queue", invoke_without_command=True)
 @verbose
 @click.pass_context
-def queue_command(context: click.Context) -> int | None:
+def queue_group(context: click.Context) -> int | None:
     """Queue files, as the companion reads and writes them.
 
     \b
     Example: sacbus queue get /tmp/sacbus-10 queue.csv
     """
-    if context.invoked_subcommand is not None:
-        return None
-    click.echo(context.get_help(), err=True)
-    return USAGE_STATUS
+    return help_unless_asked(context)
 
 
-@queue_command.command("get")
+@queue_group.command("get")
 @click.argument("terminal")
 @click.argument("file", metavar="FILE.csv")
 @baud

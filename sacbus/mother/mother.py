@@ -88,6 +88,11 @@ class Mother:
                 mother.lose(f"the line was closed, {link}, connect again")
 
     @property
+    def caller(self) -> Caller:
+        """The transactions themselves, for whoever waits for them without a loop."""
+        return self._caller
+
+    @property
     def statistics(self) -> Mapping[int, NodeStatistics]:
         """Counts and round trips by node; address 0 holds the broadcasts."""
         return self._caller.statistics

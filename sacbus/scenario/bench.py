@@ -71,8 +71,6 @@ class Bench:
     def begin(self, origin: Ns) -> None:
         """The scenario begins now, which is its time 0."""
         self.origin = origin
-        self.warnings.clear()
-        self.warned.clear()
         self._collided_before = self._collided()
 
     def stir(self) -> None:

@@ -20,7 +20,7 @@ from typing import Final
 from platformdirs import user_state_path
 
 from sacbus.terminal.background import Background
-from sacbus.terminal.dialog import Untypable
+from sacbus.terminal.dialog import PROMPT, NoAnswer, Untypable
 
 try:
     import readline
@@ -37,10 +37,14 @@ HISTORY_LINES: Final = 1_000
 def converse(link: str, baud: int, *, history: bool) -> None:
     """Talk until the end of input (Ctrl-D). KeyboardInterrupt is passed on.
 
-    ``history``: keep what is typed for the next time. LinkError, ConnectionError, NoAnswer in one
-    line each.
+    ``history``: keep what is typed for the next time. LinkError, ConnectionError, and NoAnswer to
+    the first question, in one line each.
     """
     screen = _Screen()
+    if _HERE:
+        # Nobody wants files completed here, nor an Esc too many to change what all keys mean.
+        for binding in ("tab: self-insert", '"\\M-\\C-j": accept-line', '"\\M-\\C-m": accept-line'):
+            readline.parse_and_bind(binding)
     main = threading.get_ident()
     lost = threading.Event()
 
@@ -60,7 +64,8 @@ def converse(link: str, baud: int, *, history: bool) -> None:
                     line = input(prompt)
                 try:
                     dialog.ask(line)
-                except Untypable as fault:
+                except (Untypable, NoAnswer) as fault:
+                    # The next line may fare better.
                     screen.show(f"{fault}\n{prompt}")
         except EOFError:
             screen.end()
@@ -77,7 +82,8 @@ class _Screen:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._open = ""
-        self._editing = False
+        #: What stands before the line that is being edited; None while there is none.
+        self._prompt: str | None = None
 
     def show(self, text: str) -> None:
         """Print what has come, above the line that is being edited if one is."""
@@ -85,9 +91,11 @@ class _Screen:
             *whole, self._open = (self._open + text).split("\n")
             if not whole:
                 return
-            if self._editing:
-                # Before the line that is edited there was the prompt, and that stands there.
-                whole = [line for line in whole if line.strip()]
+            if self._prompt is not None:
+                # A prompt stands before the line that is edited; what comes ends with one as well,
+                # which is a whole line once more has come behind it.
+                bare = {"", PROMPT, self._prompt.strip()}
+                whole = [line for line in whole if line.strip() not in bare]
                 sys.stdout.write("".join(map(_above, whole)))
             else:
                 sys.stdout.write("".join(f"{line}\n" for line in whole))
@@ -97,15 +105,15 @@ class _Screen:
     def edited(self) -> Iterator[str]:
         """While a line is edited behind the prompt that this gives."""
         with self._lock:
-            prompt, self._open = self._open, ""
-            self._editing = True
+            self._prompt = prompt = self._open
+            self._open = ""
         try:
             yield prompt
         finally:
             with self._lock:
                 # What has come meanwhile ends with a prompt again, which the answer follows.
                 self._open = ""
-                self._editing = False
+                self._prompt = None
 
     def end(self) -> None:
         """Leave the open line."""

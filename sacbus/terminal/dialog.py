@@ -38,7 +38,13 @@ BREATH: Final = 0.03
 #: before a SAC shows its version, and after that it shows its prompt within one.
 BOOT: Final = 2.5
 
-_PROMPTED: Final = re.compile(rb"(?:^|[\r\n])SAC>\s*$")
+_PROMPTED: Final = re.compile(rb"[\r\n]SAC>\s*$")
+
+#: As many of the last bytes as a prompt is looked for in; blanks behind it leave room for more.
+_TAIL: Final = 64
+
+#: Where a pty stands on Linux and the BSDs, and on macOS; a serial port has a name there.
+_PTY: Final = re.compile(r"/dev/(pts/|ttys)\d+")
 
 
 class NoAnswer(LinkError, TimeoutError):
@@ -48,7 +54,8 @@ class NoAnswer(LinkError, TimeoutError):
         super().__init__(
             f"no answer within {PATIENCE:g} s, expected the prompt {PROMPT}",
             where,
-            "check that it is a terminal port and not the network's, and the baud rate",
+            "check that it is a terminal port and not the network's, the baud rate, and that no "
+            "other program reads it",
         )
 
 
@@ -82,9 +89,12 @@ class Dialog:
         self._tell = lose
         self._echo = LineEcho(b"")
         self._echo.over = True
-        #: All that has come since the last line was sent, its echo included, and without it.
-        self._heard = b""
-        self._text = ""
+        #: Whether anything has come since the last line was sent, and the end of that, which begins
+        #: where a line does.
+        self._answered = False
+        self._tail = b"\n"
+        #: What has come since, without the echo, for who waits for it; nobody keeps the rest.
+        self._shown: list[str] | None = []
         self._news = asyncio.Event()
         self._lost: str | None = None
         line.start(self._hear, self._lose)
@@ -93,12 +103,14 @@ class Dialog:
         """Have a prompt before the first line; what is shown until then. :class:`NoAnswer`."""
         if not _is_pty(self._where):
             await self._hear_out(BOOT, BOOT)
-        shown = self._text
-        if not _PROMPTED.search(self._heard):
-            shown += await self.ask("")
-            if not self._text.strip():  # a loop of wire gives back as much
-                raise NoAnswer(self._where)
-        return shown
+        before = self._text()
+        if _PROMPTED.search(self._tail):
+            self._shown = None
+            return before
+        shown = await self.ask("")
+        if not shown.strip():  # a loop of wire gives back as much
+            raise NoAnswer(self._where)
+        return before + shown
 
     async def ask(self, line: str) -> str:
         """Send a line and CR; what is shown upon it, the prompt included.
@@ -110,21 +122,28 @@ class Dialog:
                 raise Untypable(column, one)
         data = line.encode("ascii")
         self._echo = LineEcho(data)
-        self._heard, self._text = b"", ""
+        self._answered, self._tail = False, b"\n"
+        self._shown = []
         self._line.send(data + b"\r")
-        await self._hear_out(PATIENCE, PAUSE)
-        if not self._heard:
-            raise NoAnswer(self._where)
-        return self._text
+        try:
+            await self._hear_out(PATIENCE, PAUSE)
+            if not self._answered:
+                raise NoAnswer(self._where)
+            return self._text()
+        finally:
+            self._shown = None
+
+    def _text(self) -> str:
+        return "".join(self._shown or ())
 
     async def _hear_out(self, patience: float, pause: float) -> None:
         """Wait until a prompt has come, or silence: seconds before an answer, and behind one."""
         while True:
             if self._lost is not None:
                 raise ConnectionError(self._lost)
-            if _PROMPTED.search(self._heard):
+            if _PROMPTED.search(self._tail):
                 wait = BREATH
-            elif self._heard and self._echo.over:
+            elif self._answered and self._echo.over:
                 wait = pause
             else:
                 wait = patience
@@ -138,14 +157,16 @@ class Dialog:
                 return
 
     def _hear(self, data: bytes) -> None:
-        self._heard += data
+        self._answered = True
+        self._tail = (self._tail + data)[-_TAIL:]
         self._take(self._echo.strip(data))
         self._news.set()
 
     def _take(self, data: bytes) -> None:
         if data:
             text = data.replace(b"\r", b"").decode("latin-1")
-            self._text += text
+            if self._shown is not None:
+                self._shown.append(text)
             self._show(text)
 
     def _lose(self, why: str) -> None:
@@ -156,4 +177,4 @@ class Dialog:
 
 def _is_pty(link: str) -> bool:
     """Whether nothing is reset when the link is opened, since it is no adapter's port."""
-    return os.path.realpath(link).startswith("/dev/pts/")
+    return _PTY.fullmatch(os.path.realpath(link)) is not None

@@ -12,6 +12,9 @@ __all__ = ["LineEcho"]
 #: What a port may make of the CR that ends a line.
 _ENDS: Final = (b"\r\n", b"\n\r", b"\r", b"\n")
 
+#: What a SAC says of a line that is too long for it; it has echoed only as much as it took.
+_TOO_LONG: Final = b"2big."
+
 
 class LineEcho:
     """The echo of one line and its end, which is the first that comes after it was sent.
@@ -34,7 +37,7 @@ class LineEcho:
         if line.startswith(held) and held != line:
             return b""
         if not held.startswith(line):
-            return self._decide(held)
+            return self._cut_short(held)
         rest = held[len(line) :]
         for end in _ENDS:
             if rest.startswith(end) and (len(end) == 2 or len(rest) > 1):
@@ -42,6 +45,20 @@ class LineEcho:
         if len(rest) > 1:
             return self._decide(rest)
         return b""
+
+    def _cut_short(self, held: bytes) -> bytes:
+        """Take out the beginning of a line that is refused; else what has come is no echo."""
+        echoed = 0
+        while self._line.startswith(held[: echoed + 1]):  # as all of it would not
+            echoed += 1
+        rest = held[echoed:]
+        for end in _ENDS if echoed else ():
+            refusal = end + _TOO_LONG
+            if rest.startswith(refusal):
+                return self._decide(rest[len(end) :])
+            if refusal.startswith(rest):
+                return b""
+        return self._decide(held)
 
     def settle(self) -> bytes:
         """No more comes: what was kept and is no echo."""

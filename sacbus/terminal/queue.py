@@ -26,11 +26,13 @@ async def read_queue(link: str, baud: int) -> QueueScreen:
         dialog = Dialog(line, link)
         await dialog.begin()
         shown = await dialog.ask("q")
-    try:
-        screen = QueueScreen.read(shown)
-    except WrongScreen as fault:
-        what = f"this is no row of a queue screen, got {fault.got[:100]!r}"
-        raise LinkError(what, f"{link}, line {fault.line} of the answer to q", _AGAIN) from fault
+        screen = _read(shown, link)
+        if screen is None:
+            # Whoever was here before may have left it in a program mode, which X leaves; at the
+            # prompt an X alone does nothing.
+            await dialog.ask("x")
+            shown = await dialog.ask("q")
+            screen = _read(shown, link)
     if screen is None:
         last = (shown.split("\n") or [""])[-1]
         what = f"no queue screen upon q, expected its last line 'Q is at …', got {last[:60]!r}"
@@ -41,3 +43,11 @@ async def read_queue(link: str, baud: int) -> QueueScreen:
         what = f"lines of the queue screen are missing, expected positions from 1, got {positions}"
         raise LinkError(what, link, _AGAIN)
     return QueueScreen(rows, screen.next_free)
+
+
+def _read(shown: str, link: str) -> QueueScreen | None:
+    try:
+        return QueueScreen.read(shown)
+    except WrongScreen as fault:
+        what = f"this is no row of a queue screen, got {fault.got[:100]!r}"
+        raise LinkError(what, f"{link}, line {fault.line} of the answer to q", _AGAIN) from fault

@@ -24,6 +24,9 @@ __all__ = ["Difference", "differences"]
 #: Bus time that positions are compared for at once.
 SPELL: Final[Ns] = 10_000_000_000
 
+#: Entries that one sequence may have more than the other and still be followed.
+FAR: Final = 16
+
 #: What stands where one of the two has nothing.
 NOTHING: Final = "nothing"
 
@@ -129,24 +132,28 @@ def _walk(
             if abs(one.when - other.when) > within:
                 yield one.when, one.words, f"{other.words} {other.when - one.when:+} ns off"
             i, j = i + 1, j + 1
-        elif _comes(one, got, j, within):
-            yield other.when, NOTHING, other.words
-            j += 1
-        elif _comes(other, expected, i, within):
-            yield one.when, one.words, NOTHING
-            i += 1
         else:
-            yield one.when, one.words, other.words
-            i, j = i + 1, j + 1
+            missing, extra = _ahead(other, expected, i, within), _ahead(one, got, j, within)
+            if missing and extra == missing:
+                # Either would do: whichever has more to come has more altogether.
+                missing = len(expected) - i >= len(got) - j
+            if missing and not 0 < extra < missing:
+                yield one.when, one.words, NOTHING
+                i += 1
+            elif extra:
+                yield other.when, NOTHING, other.words
+                j += 1
+            else:
+                yield one.when, one.words, other.words
+                i, j = i + 1, j + 1
 
 
-def _comes(entry: _Entry, among: Sequence[_Entry], place: int, within: Ns) -> bool:
-    """Whether what an entry says stands behind the next one of the other sequence, in time."""
-    return (
-        place + 1 < len(among)
-        and among[place + 1].words == entry.words
-        and abs(among[place + 1].when - entry.when) <= within
-    )
+def _ahead(entry: _Entry, among: Sequence[_Entry], place: int, within: Ns) -> int:
+    """How far behind a place of the other sequence stands what an entry says; 0: not near it."""
+    for far, other in enumerate(among[place + 1 : place + 1 + FAR], start=1):
+        if other.words == entry.words and abs(other.when - entry.when) <= within:
+            return far
+    return 0
 
 
 def _parting(expected: Track, got: Track, over: Ns, within: Ns, steps: float) -> Ns | None:
@@ -181,14 +188,14 @@ def _alike(expected: Track, got: Track, since: Ns, until: Ns, within: Ns) -> boo
 
 
 def _apart(expected: Track, got: Track, at: Ns, within: Ns, steps: float) -> bool:
-    """Whether no instant that is near enough brings the two near enough, whichever is late."""
+    """Whether one is somewhere that the other is at no instant that is near enough."""
     instants = (at - within, at, at + within)
 
     def reached(track: Track, target: float) -> bool:
         places = [track.steps(one) for one in instants]
         return min(places) - steps <= target <= max(places) + steps
 
-    return not (reached(got, expected.steps(at)) or reached(expected, got.steps(at)))
+    return not (reached(got, expected.steps(at)) and reached(expected, got.steps(at)))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -35,7 +35,7 @@ class Line:
     def __init__(self, *faults: Fault, rate: LineRate = RATE, seed: int = 0) -> None:
         self.kernel = Kernel()
         self.medium: Medium = Bus(self.kernel, KIND.protocol, rate=rate, seed=seed).medium
-        self.ons = [self.medium.add_fault(fault) for fault in faults]
+        self.on_line = [self.medium.add_fault(fault) for fault in faults]
         self.heard: list[tuple[Ns, int]] = []
         self.ninth = b""
         self.seen: list[Transmission] = []
@@ -62,7 +62,7 @@ def test_bit_errors_count_exactly_the_bits_that_differ(data: bytes, rate: float,
     line = Line(BitErrors(rate), seed=seed)
     arrived = line.send(data)
     differ = sum((a ^ b).bit_count() for a, b in zip(arrived, data, strict=True))
-    assert line.ons[0].count == differ
+    assert line.on_line[0].count == differ
     assert line.seen[0].faults == (("bit_errors",) if differ else ())
     assert line.seen[0].data == data
 
@@ -72,7 +72,7 @@ def test_every_data_bit_is_as_likely_to_be_inverted_and_the_ninth_is_one_of_them
     line = Line(BitErrors(0.1), rate=LineRate(57_600, 11))
     arrived = line.send(bytes(count), bytes(count))
     struck = [sum(byte >> bit & 1 for byte in arrived) for bit in range(8)] + [sum(line.ninth)]
-    assert line.ons[0].count == sum(struck)
+    assert line.on_line[0].count == sum(struck)
     assert all(abs(one - count / 10) < 4 * (count * 0.09) ** 0.5 for one in struck)
     outcome = line.seen[0].outcome_ninth(line.medium.seed)
     assert outcome == line.ninth
@@ -90,7 +90,7 @@ def test_what_is_dropped_leaves_a_gap_and_the_rest_comes_when_it_would_have(
     assert [at for at, _ in line.heard] == pytest.approx(
         [RATE.span(index) for _, index in line.heard], abs=1
     )
-    assert line.ons[0].count == len(data) - len(line.heard)
+    assert line.on_line[0].count == len(data) - len(line.heard)
 
 
 @pytest.mark.slow
@@ -99,7 +99,7 @@ def test_what_comes_twice_makes_room_for_itself(size: int, seed: int) -> None:
     line = Line(Duplicate(0.2), seed=seed)
     arrived = line.send(bytes(range(size)))
     assert sorted(set(arrived)) == list(range(size)) == list(dict.fromkeys(arrived))
-    assert len(arrived) == size + line.ons[0].count
+    assert len(arrived) == size + line.on_line[0].count
     apart = [later - one for (one, _), (later, _) in pairwise(line.heard)]
     assert all(BYTE <= one <= BYTE + 1 for one in apart)
 
@@ -112,7 +112,7 @@ def test_what_is_late_holds_up_all_behind_it_and_nothing_is_lost(size: int, seed
     late = [at - RATE.span(index) for at, index in line.heard]
     steps = [later - one for one, later in pairwise([0, *late])]
     assert all(-1 <= one <= 2 * MS for one in steps)
-    assert sum(one > 1 for one in steps) <= line.ons[0].count
+    assert sum(one > 1 for one in steps) <= line.on_line[0].count
 
 
 @pytest.mark.slow

@@ -76,8 +76,8 @@ def test_a_fault_more_shifts_nothing_in_those_before_it() -> None:
 def test_two_faults_of_one_kind_and_two_buses_of_one_kernel_have_chances_of_their_own() -> None:
     kernel = Kernel()
     buses = [Bus(kernel, KIND.protocol, seed=seed) for seed in (1, 2)]
-    ons = [bus.medium.add_fault(BitErrors(0.5)) for bus in (*buses, buses[0])]
-    drawn = [on.random.random() for on in ons]
+    on_line = [bus.medium.add_fault(BitErrors(0.5)) for bus in (*buses, buses[0])]
+    drawn = [on.random.random() for on in on_line]
     assert len(set(drawn)) == 3
 
 
@@ -127,10 +127,10 @@ def test_what_began_under_a_fault_ends_under_it_and_what_began_before_is_spared(
 def test_the_same_fault_may_be_on_several_lines_and_each_counts_its_own() -> None:
     fault = Drop(1)
     (kernel, one, _), (_, other, _) = line(), line()
-    ons = one.add_fault(fault), other.add_fault(fault)
+    on_line = one.add_fault(fault), other.add_fault(fault)
     one.transmit("a", b"AB", 0)
     kernel.run()
-    assert [on.count for on in ons] == [2, 0]
+    assert [on.count for on in on_line] == [2, 0]
 
 
 # ---- what it costs others -----------------------------------------------------------------------

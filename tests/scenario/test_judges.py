@@ -124,6 +124,34 @@ def test_packets_are_seen_by_body_pattern_and_addresses(file: Path) -> None:
     ]
 
 
+def test_a_packet_to_another_one_is_not_it(file: Path) -> None:
+    text = """
+        [[step]]
+        at = "0 s"
+        expect = { packet = "m400", to = 11, within = "10 ms" }
+        [[step]]
+        at = "0 s"
+        send = "10m400"
+        """
+    assert failures(file, text) == [
+        "line 5: expected packet 'm400' to 11 within 10 ms, got none and 2 others, at 0.010000 s"
+    ]
+
+
+def test_who_is_dead_breaks_no_silence(file: Path) -> None:
+    head = "[[bus]]\n[[bus.nodes]]\naddress = 10\nsoft_ops = true\n"
+    text = """
+        [[step]]
+        send = "10m4"
+        [[step]]
+        FAULT
+        [[step]]
+        expect = { silence = "1 s" }
+        """
+    assert failures(file, text.replace("FAULT", "fault = { dead = 10 }"), head) == []
+    assert len(failures(file, text.replace("FAULT", 'mark = "x"'), head)) == 1
+
+
 def test_soft_ops_are_packets_to_all(file: Path) -> None:
     head = "[[bus]]\n[[bus.nodes]]\naddress = 10\nsoft_ops = true\n"
     text = """

@@ -118,16 +118,25 @@ class Person:
             assert self._look(), f"the program ended, saw {self.seen!r}"
         return self.seen
 
-    def leaves(self) -> int:
-        """Look on until the program has ended; its status."""
-        deadline = time.monotonic() + PATIENCE
-        while self._ready(deadline) and self._look():
-            pass
-        return self.process.wait(PATIENCE)
+    def leaves(self, upon: str = "") -> int:
+        """Look on until the program has ended; its status.
 
-    def _ready(self, deadline: float) -> bool:
-        patience = max(deadline - time.monotonic(), 0)
-        ready, _, _ = select.select([self._keyboard], [], [], patience)
+        ``upon`` is pressed each second until it does: a signal that comes just before readline
+        begins to wait is seen by Python at the next key only.
+        """
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            if upon and not select.select([self._keyboard], [], [], 1)[0]:
+                self._ready(deadline, at_once=True)
+                self.types(upon)
+            elif not (self._ready(deadline) and self._look()):
+                return self.process.wait(PATIENCE)
+
+    def _ready(self, deadline: float, *, at_once: bool = False) -> bool:
+        patience = deadline - time.monotonic()
+        ready = patience > 0 and (
+            at_once or select.select([self._keyboard], [], [], patience)[0] != []
+        )
         assert ready, f"waited in vain, saw {self.seen!r}"
         return True
 

@@ -108,6 +108,26 @@ def test_what_comes_unasked_stands_above_the_line_that_is_being_edited(tmp_path:
         assert who.leaves() == 0
 
 
+def test_of_many_that_come_unasked_none_brings_a_prompt_of_its_own(tmp_path: Path) -> None:
+    with device() as port, person("terminal", port.path, HOME=str(tmp_path)) as who:
+        prompted(who, 1)
+        who.types("m4")
+        who.sees(lambda seen: plain(seen).endswith("SAC>m4"))
+        for number in range(3):
+            port.say(b"\r\n85:10> hello %d\r\nSAC>" % number)
+        port.say(b"\r\n85:10> bye\r\nSA")
+        who.sees(lambda seen: "bye\x1b8\x1b[B" in seen)
+        port.say(b"C>\r\n\r\nSAC 1.17\r\nSAC>")
+        seen = who.sees(lambda seen: "1.17\x1b8\x1b[B" in seen)
+        lines = ["85:10> hello 0", "85:10> hello 1", "85:10> hello 2", "85:10> bye", "SAC 1.17"]
+        assert re.findall(r"\x1b\[L([^\x1b]*)\x1b8", seen) == lines
+        who.types("00\r")
+        heard(port, b"", b"m400")
+        prompted(who, 2)
+        who.types(CONTROL_D)
+        assert who.leaves() == 0
+
+
 def test_a_dumb_terminal_is_shown_no_sequences(tmp_path: Path) -> None:
     with device() as port, person("terminal", port.path, HOME=str(tmp_path), TERM="dumb") as who:
         prompted(who, 1)
@@ -122,7 +142,7 @@ def test_control_c_leaves_with_its_status(tmp_path: Path) -> None:
     with device() as port, person("terminal", port.path, HOME=str(tmp_path)) as who:
         prompted(who, 1)
         who.types(CONTROL_C)
-        assert who.leaves() == 130
+        assert who.leaves(upon=CONTROL_C) == 130
         assert who.errors() == "\ninterrupted\n"
 
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+import tracemalloc
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 import pytest
 
+from sacbus.host import run_virtual
+from sacbus.kernel import Kernel
 from sacbus.links import Line, open_line
-from sacbus.terminal.dialog import Dialog, NoAnswer
+from sacbus.terminal.dialog import BREATH, PAUSE, Dialog, NoAnswer
 from tests.terminal.rig import PROMPT, Device, device
 
 _T = TypeVar("_T")
@@ -21,6 +25,21 @@ def talk(with_device: Device, scene: Callable[[Dialog], Awaitable[_T]]) -> _T:
             return await scene(Dialog(line, with_device.path))
 
     return asyncio.run(main())
+
+
+#: A message that comes unasked, and how many of them.
+ROW = b"85:10> hello\n"
+ROWS = 5_000
+
+
+@contextmanager
+def traced() -> Iterator[None]:
+    """What is allocated is counted meanwhile."""
+    tracemalloc.start()
+    try:
+        yield
+    finally:
+        tracemalloc.stop()
 
 
 async def begun(dialog: Dialog) -> tuple[str, str]:
@@ -43,6 +62,104 @@ def test_an_answer_is_as_long_as_it_is() -> None:
     with device(lambda line: (screen if line else b"") + PROMPT) as port:
         _, shown = talk(port, begun)
         assert shown == screen.replace(b"\r", b"").decode() + "SAC>"
+
+
+def test_an_answer_in_many_pieces_is_not_copied_with_each() -> None:
+    async def scene() -> None:
+        line = Line("memory")
+        dialog = Dialog(line, "memory")
+        asking = asyncio.create_task(dialog.ask("q"))
+        await asyncio.sleep(0)
+        for _ in range(ROWS):
+            line.hear(ROW)
+        tracemalloc.reset_peak()
+        before, _ = tracemalloc.get_traced_memory()
+        line.hear(ROW)
+        _, peak = tracemalloc.get_traced_memory()
+        assert peak - before < ROWS * len(ROW) / 10
+        line.hear(PROMPT)
+        assert await asking == ROW.decode() * (ROWS + 1) + "SAC>"
+
+    with traced():
+        asyncio.run(scene())
+
+
+def test_what_comes_while_nobody_waits_is_shown_and_not_kept() -> None:
+    async def scene() -> None:
+        line = Line("memory")
+        shown = 0
+
+        def show(text: str) -> None:
+            nonlocal shown
+            shown += len(text)
+
+        dialog = Dialog(line, "memory", show)
+        asking = asyncio.create_task(dialog.ask("q"))
+        await asyncio.sleep(0)
+        line.hear(PROMPT)
+        assert await asking == "SAC>"
+        before, _ = tracemalloc.get_traced_memory()
+        for _ in range(ROWS):
+            line.hear(ROW)
+        after, _ = tracemalloc.get_traced_memory()
+        assert after - before < ROWS * len(ROW) / 10
+        assert shown == len(PROMPT) + ROWS * len(ROW)
+
+    with traced():
+        asyncio.run(scene())
+
+
+@pytest.mark.parametrize(
+    ("shown", "over"),
+    [
+        (b"SAC>", True),
+        (b"\r\nSAC>\r\n", True),
+        (b"x" * 200 + b"\nSAC>", True),
+        (b"x" * 200 + b"SAC>", False),
+        (b"xSAC>" + b" " * 60, False),
+    ],
+)
+def test_a_prompt_stands_at_the_beginning_of_a_line(shown: bytes, over: bool) -> None:
+    async def scene() -> None:
+        line = Line("memory")
+        asking = asyncio.create_task(Dialog(line, "memory").ask("q"))
+        await asyncio.sleep(0)
+        loop = asyncio.get_running_loop()
+        began = loop.time()
+        for at in range(len(shown)):
+            line.hear(shown[at : at + 1])
+        await asking
+        # A prompt ends an answer at once, and what is none only by the silence behind it.
+        assert loop.time() - began == pytest.approx(BREATH if over else PAUSE)
+
+    run_virtual(Kernel(), scene())
+
+
+@pytest.mark.parametrize(
+    ("link", "at_once"),
+    [
+        ("/dev/pts/7", True),
+        ("/dev/ttys007", True),  # macOS
+        ("/dev/ttyS0", False),
+        ("/dev/ttyUSB0", False),
+        ("/dev/cu.usbserial-1", False),
+        ("/dev/tty.usbserial-1", False),
+    ],
+)
+def test_only_to_a_pty_a_line_is_sent_before_a_boot_would_be_over(link: str, at_once: bool) -> None:
+    sent: list[bytes] = []
+
+    class Listening(Line):
+        def send(self, data: bytes) -> None:
+            sent.append(data)
+
+    async def scene() -> None:
+        beginning = asyncio.create_task(Dialog(Listening(link), link).begin())
+        await asyncio.sleep(0)
+        beginning.cancel()
+
+    asyncio.run(scene())
+    assert sent == ([b"\r"] if at_once else [])
 
 
 def test_what_follows_a_prompt_at_once_is_of_the_same_answer() -> None:

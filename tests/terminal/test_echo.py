@@ -32,7 +32,13 @@ SHOWN = [
     # No echo, or that of another line: nothing is lost.
     (b"q", b"\r\nQ\tSteps", b"\r\nQ\tSteps"),
     (b"m400", b"m40", b"m40"),
-    (b"m400", b"m4\r\n2big.\r\nSAC>", b"m4\r\n2big.\r\nSAC>"),
+    (b"m400", b"m4\r\n2bi", b"m4\r\n2bi"),
+    (b"m400", b"m4\r\nSAC>", b"m4\r\nSAC>"),
+    (b"m400", b"\r\n2big.\r\nSAC>", b"\r\n2big.\r\nSAC>"),
+    # A line that is too long is echoed as far as it was taken.
+    (b"m400", b"m4\r\n2big.\r\nSAC>", b"2big.\r\nSAC>"),
+    (b"m400", b"m4\r2big.\r\nSAC>", b"2big.\r\nSAC>"),
+    (b"m400", b"m4\n2big.\nSAC>", b"2big.\nSAC>"),
 ]
 
 

@@ -51,6 +51,21 @@ def test_a_queue_is_written_one_to_one(capsys: Captured, tmp_path: Path) -> None
         }
 
 
+def test_a_program_mode_that_somebody_left_open_is_left(tmp_path: Path) -> None:
+    file = tmp_path / "queue.csv"
+    mode = ["qp"]
+
+    def answer(line: bytes) -> bytes:
+        if line == b"x":
+            mode.clear()
+        return screen(WHOLE) if line == b"q" and not mode else PROMPT
+
+    with device(answer) as port:
+        assert run(["queue", "get", port.path, str(file)]) == 0
+    assert tuple(one.row for one in read_rows(file.read_text().splitlines())) == ROWS
+    assert not mode
+
+
 def test_standard_output_gets_the_file_itself(
     capfdbinary: pytest.CaptureFixture[bytes], tmp_path: Path
 ) -> None:

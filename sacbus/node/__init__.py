@@ -1,0 +1,72 @@
+"""The contract between the bus and a kind of node, and the registry of kinds.
+
+Owns the shapes in which the two meet, a file each: what a node hears, can be asked and tells
+(``contract``), what a wire protocol must answer (``protocol``), what a configuration may say of a
+node (``settings``), and how kinds are found (``kind``). Time is always an argument, in ns of bus
+time. Nothing here knows a particular protocol or kind.
+"""
+
+from .contract import (
+    BOOT,
+    OFF,
+    Heard,
+    Node,
+    PinError,
+    Pins,
+    Report,
+    ReportKind,
+    Snapshot,
+    Terminal,
+)
+from .kind import (
+    GROUP,
+    KindError,
+    MemoryTable,
+    MemoryValue,
+    MemoryWords,
+    NodeKind,
+    find_kind,
+    kind_names,
+    kinds,
+)
+from .protocol import EVERYONE, Decoder, Protocol, Said
+from .settings import (
+    NodeSettings,
+    Setting,
+    SettingError,
+    misfits,
+    setting_list,
+    settings_from,
+)
+
+__all__ = [
+    "BOOT",
+    "EVERYONE",
+    "GROUP",
+    "OFF",
+    "Decoder",
+    "Heard",
+    "KindError",
+    "MemoryTable",
+    "MemoryValue",
+    "MemoryWords",
+    "Node",
+    "NodeKind",
+    "NodeSettings",
+    "PinError",
+    "Pins",
+    "Protocol",
+    "Report",
+    "ReportKind",
+    "Said",
+    "Setting",
+    "SettingError",
+    "Snapshot",
+    "Terminal",
+    "find_kind",
+    "kind_names",
+    "kinds",
+    "misfits",
+    "setting_list",
+    "settings_from",
+]

@@ -1,0 +1,143 @@
+"""Recordings at the command line: ``serve --record``, ``export``, ``diff``; one that is killed."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from sacbus.cli import run
+from sacbus.mother import safe_body
+from sacbus.trace import read
+from sacbus.trace.records import Moved, Sent
+from sacbus.wire import encode
+from tests.serving import client, served, until
+from tests.trace.rig import Dump, recorded, two_axes
+
+Captured = pytest.CaptureFixture[str]
+
+ACK_10 = bytes.fromhex("02 01 0a 06")
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    sink = BytesIO()
+    recorded(two_axes, sink=sink)
+    path = tmp_path / "run.jsonl"
+    path.write_bytes(sink.getvalue())
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("killed", [True, False])
+def test_what_a_bus_that_is_served_did_is_in_the_file(tmp_path: Path, *, killed: bool) -> None:
+    path = tmp_path / "run.jsonl"
+    with served("--ephemeral", "--record", str(path)) as sacbus:
+        with client(sacbus.link) as port:
+            port.write(encode(10, 1, b"m400v120"))
+            assert port.read(4) == ACK_10
+        # It is there soon after, although nothing more happens.
+        until(lambda: any(isinstance(one, Sent) and one.sender == 10 for one in read(path)))
+        status = sacbus.send_signal(signal.SIGKILL if killed else signal.SIGTERM)
+        assert status == (-signal.SIGKILL if killed else 0)
+    recording = read(path)
+    sent = [one for one in recording if isinstance(one, Sent)]
+    assert [one.sender for one in sent] == ["link 1", 10]
+    assert recording.whole is not killed
+    track = recording.track(10)
+    assert track.command(sent[-1].end) == "m400v120a1d1"
+    # Where it would have come to: the segment tells to its end.
+    assert track.position(10**15) == 400 or not killed
+
+
+@pytest.mark.slow
+def test_killed_while_it_records_much_it_leaves_a_file_that_can_be_read(tmp_path: Path) -> None:
+    path = tmp_path / "run.jsonl"
+    with (
+        served("--ephemeral", "--no-pace", "--record", str(path)) as sacbus,
+        client(sacbus.link) as port,
+    ):
+        number = 0
+        while path.stat().st_size < 100_000:
+            port.write(encode(10, 1, safe_body(b"xm%dv400" % (100 + number % 300))))
+            assert port.read(4) == ACK_10
+            number += 1
+        port.write(encode(10, 1, safe_body(b"xm100v400")) * 20)
+        sacbus.send_signal(signal.SIGKILL)
+    recording = read(path)
+    records = list(recording)
+    assert len([one for one in records if isinstance(one, Moved)]) > 50
+    assert not recording.whole
+
+
+def test_export_writes_what_it_is_asked_for(
+    recording: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    vcd, csv, positions = (tmp_path / name for name in ("run.vcd", "run.csv", "where.csv"))
+    asked = ["--vcd", str(vcd), "--csv", str(csv), "--positions", str(positions), "--every", "1s"]
+    assert run(["export", str(recording), *asked]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split(": ")[0] for line in said] == [str(vcd), str(csv), str(positions)]
+    assert len(Dump(vcd.read_text()).rises("bus.node_10.clk")) == 450
+    assert csv.read_text().startswith("time_ns,bus,node,event,value,text\n")
+    assert len(positions.read_text().splitlines()) == 1 + 2 * 5
+
+
+def test_export_says_when_a_recording_was_cut_off(
+    recording: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    recording.write_bytes(recording.read_bytes()[:-60])
+    assert run(["export", str(recording), "--csv", str(tmp_path / "run.csv")]) == 0
+    assert re.fullmatch(
+        rf"note: {recording} was cut off at \d\.\d+ s: it was not closed\n",
+        capsys.readouterr().err,
+    )
+
+
+def test_diff_of_the_same_is_silent_and_status_0(recording: Path, capsys: Captured) -> None:
+    assert run(["diff", str(recording), str(recording)]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_diff_of_others_tells_the_first_and_is_status_1(
+    recording: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    other = tmp_path / "other.jsonl"
+    other.write_bytes(recording.read_bytes().replace(b'"02010a06"', b'"02010a15"'))
+    assert run(["diff", str(recording), str(other)]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r"0\.\d{9} s, bus: packet: expected 10>1 'ACK', got 10>1 'NAK'", lines[0])
+    assert run(["diff", str(recording), str(other), "--json", "--most", "1"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert (told["bus"], told["node"], told["what"]) == ("bus", None, "packet")
+    assert (told["expected"], told["got"]) == ("10>1 'ACK'", "10>1 'NAK'")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["diff", "{run}", "{none}"], "{none}: No such file or directory, name a recording"),
+        (["diff", "{queue}", "{run}"], "{queue}, line 1: expected a recording of sacbus, got "),
+        (["diff", "{run}", "{broken}"], "{broken}, line 2: expected a record, got 'x'"),
+        (["diff", "{run}", "{run}", "--time", "1 year"], "expected a time such as 1us, 10ms or"),
+        (["export", "{run}"], "nothing to write: give --vcd, --csv or --positions a file"),
+        (["export", "{run}", "--csv", "x", "--every", "0"], "expected a time above 0, got '0'"),
+        (["export", "{broken}", "--csv", "{out}"], "{broken}, line 2: expected a record, got 'x'"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_status_2(
+    arguments: list[str], text: str, recording: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    queue, broken = tmp_path / "queue.txt", tmp_path / "broken.jsonl"
+    queue.write_text(" 1 , 800 , 0\n")
+    broken.write_bytes(recording.read_bytes().splitlines(keepends=True)[0] + b"x\n")
+    names = {"run": recording, "none": tmp_path / "none", "queue": queue, "broken": broken}
+    names["out"] = tmp_path / "out"
+    assert run([one.format(**names) for one in arguments]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: ")
+    assert text.format(**names) in line

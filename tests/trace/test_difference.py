@@ -1,0 +1,92 @@
+"""Two recordings compared: what counts, and what tolerances forgive."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+
+from sacbus.daemon import Configuration, HostedBus
+from sacbus.kernel import MS, US
+from sacbus.mother import Mother
+from sacbus.trace import Recorder, Recording
+from sacbus.trace.difference import Difference, differences
+from tests.trace.rig import Play, recorded, two_axes
+
+
+def moving(*lines: str, after: float = 0.1, node: int = 10) -> Play:
+    async def play(_bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+        await asyncio.sleep(after)
+        for line in lines:
+            await mother.send(node, line)
+        await asyncio.sleep(2)
+
+    return play
+
+
+def of(*lines: str, after: float = 0.1, **settings: object) -> Recording:
+    return recorded(moving(*lines, after=after), Configuration(nodes=(10, 11), settings=settings))
+
+
+def test_what_is_the_same_has_none() -> None:
+    assert not differences(recorded(two_axes), recorded(two_axes))
+
+
+def test_another_command_is_told_with_time_node_and_what_came_of_it() -> None:
+    found = differences(of("m400v120"), of("m400v121"))
+    assert [one.what for one in found[:1]] == ["packet"]
+    assert (found[0].expected, found[0].got) == ("1>10 'm400v120'", "1>10 'm400v121'")
+    assert {one.what for one in found} == {"packet", "state", "position"}
+    assert all(one.node == 10 for one in found if one.what != "packet")
+    whens = [one.when for one in found]
+    assert whens == sorted(whens)
+    (position,) = [one for one in found if one.what == "position"]
+    assert abs(float(position.expected.split()[0]) - float(position.got.split()[0])) == 1
+
+
+def test_a_packet_that_is_missing_is_told_once() -> None:
+    fewer, more = of("m100", " "), of("m100", "v50", " ")
+    packets = [one for one in differences(fewer, more, within=100 * MS) if one.what == "packet"]
+    assert packets[0].expected == "nothing"
+    assert packets[0].got == "1>10 'v50'"
+    assert len(packets) == 2  # it, and its ACK
+    back = [one for one in differences(more, fewer, within=100 * MS) if one.what == "packet"]
+    assert (back[0].expected, back[0].got) == ("1>10 'v50'", "nothing")
+    assert len(back) == 2
+
+
+@pytest.mark.parametrize(("within", "same"), [(0, False), (900 * US, False), (1_100 * US, True)])
+def test_time_may_differ_by_the_tolerance(within: int, same: bool) -> None:
+    assert (not differences(of("m400"), of("m400", after=0.101), within=within)) is same
+
+
+@pytest.mark.parametrize(("steps", "same"), [(0.0, False), (1.0, False), (2.0, True)])
+def test_positions_may_differ_by_the_tolerance(steps: float, same: bool) -> None:
+    one, other = of("+", " ", " "), of("+", "+", "+")
+    found = differences(one, other, within=3_000 * MS, steps=steps)
+    assert (not [each for each in found if each.what == "position"]) is same
+
+
+def test_a_slower_clock_shows_in_positions_and_states() -> None:
+    found = differences(of("m400v120"), of("m400v120", ppm=-50_000))
+    assert {one.what for one in found} == {"state", "position"}
+
+
+@pytest.mark.parametrize(
+    ("configuration", "what", "got"),
+    [
+        (lambda: Configuration(nodes=(10,)), "nodes", "bus.10 (sac)"),
+        (lambda: Configuration(nodes=(10, 11), name="other"), "buses", "other"),
+    ],
+)
+def test_other_nodes_or_buses_are_all_that_is_told(
+    configuration: Callable[[], Configuration], what: str, got: str
+) -> None:
+    (found,) = differences(of("m100"), recorded(moving("m100"), configuration()))
+    assert (found.what, found.got) == (what, got)
+
+
+def test_a_difference_reads_as_a_line() -> None:
+    one = Difference(1_500_000_001, "bus", 10, "state", "CRUISE", "DECEL")
+    assert str(one) == "1.500000001 s, bus, node 10: state: expected CRUISE, got DECEL"

@@ -1,0 +1,197 @@
+"""What is recorded, when it is written, and what becomes of a sink that takes no more."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import json
+from io import BytesIO
+from pathlib import Path
+
+import pytest
+
+from sacbus.daemon import Configuration, HostedBus, open_bus
+from sacbus.host import run_virtual
+from sacbus.kernel import SECOND, Kernel
+from sacbus.mother import Mother
+from sacbus.trace import Recorder, read
+from sacbus.trace.records import Driven, Ended, Mark, Moved, Sent, Switched, Told, Turned
+from tests.trace.rig import recorded, two_axes
+
+
+def test_two_runs_leave_the_same_bytes() -> None:
+    sinks = BytesIO(), BytesIO()
+    for sink in sinks:
+        recorded(two_axes, sink=sink)
+    assert sinks[0].getvalue() == sinks[1].getvalue()
+
+
+def test_it_holds_bus_time_and_no_place() -> None:
+    sink = BytesIO()
+    recorded(two_axes, sink=sink)
+    text = sink.getvalue().decode()
+    assert str(Path.cwd()) not in text
+    times = [json.loads(line)["t"] for line in text.splitlines()[1:]]
+    assert times == sorted(times)
+
+
+def test_everything_that_happens_is_in_it() -> None:
+    records = list(recorded(two_axes))
+    kinds = {type(one) for one in records}
+    assert kinds == {Sent, Told, Moved, Driven, Switched, Mark, Ended}
+    sent = [one for one in records if isinstance(one, Sent)]
+    assert [one.sender for one in sent[:2]] == ["mother", 10]
+    assert sent[1].data == bytes.fromhex("02 01 0a 06")
+    assert sent[1].end - sent[1].start == 4 * 10 * SECOND // 38_400
+    driven = [(one.node, one.pin, one.level) for one in records if isinstance(one, Driven)]
+    assert driven == [(11, "sync", 0), (11, "sync", 1)]
+    switched = [(one.node, one.on) for one in records if isinstance(one, Switched)]
+    assert switched == [(10, False), (10, True)]
+    (mark,) = [one for one in records if isinstance(one, Mark)]
+    assert (mark.text, mark.details) == ("sync falls", {"axis": 11})
+
+
+def test_what_a_node_reports_and_a_turned_encoder_are_in_it() -> None:
+    async def play(bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+        await mother.send(10, "zzz")
+        bus.panel(11).turn(-2)
+
+    records = list(recorded(play))
+    (told,) = [one for one in records if isinstance(one, Told)]
+    assert (told.node, told.kind, told.line) == (10, "refused", "zzz")
+    (turned,) = [one for one in records if isinstance(one, Turned)]
+    assert (turned.node, turned.detents) == (11, -2)
+
+
+def test_what_two_talkers_spoil_is_told_as_sent_and_as_arrived() -> None:
+    async def play(bus: HostedBus, _mother: Mother, _recorder: Recorder) -> None:
+        one, other = object(), object()
+        bus.bus.medium.transmit(one, b"\x02\x0am\x03", 0)
+        await asyncio.sleep(0.0003)
+        bus.bus.medium.transmit(other, b"\x02\x0bm\x03", 0)
+        await asyncio.sleep(0.1)
+
+    sent = [one for one in recorded(play) if isinstance(one, Sent)]
+    assert [(one.sender, one.data) for one in sent] == [
+        ("link 1", b"\x02\x0am\x03"),
+        ("link 2", b"\x02\x0bm\x03"),
+    ]
+    assert all(one.collided and one.arrived != one.data for one in sent)
+    assert sent[0].arrived[:1] == b"\x02"
+
+
+def test_several_buses_go_into_one_recording() -> None:
+    sink = BytesIO()
+
+    async def main() -> None:
+        async with (
+            open_bus(Configuration(nodes=(10,), name="left")) as left,
+            open_bus(Configuration(nodes=(10,), name="right")) as right,
+        ):
+            mothers = left.mother(), right.mother()
+            with Recorder([left, right], sink):
+                await mothers[0].send(10, "m100")
+                await mothers[1].send(10, "m-100")
+                await asyncio.sleep(3)
+
+    run_virtual(Kernel(), main())
+    recording = read(sink)
+    assert [bus.name for bus in recording.buses] == ["left", "right"]
+    assert recording.track(10, 0).position(3 * SECOND) == 100
+    assert recording.track(10, 1).position(3 * SECOND) == -100
+    said = [[one.said.words for one in recording.packets(bus)] for bus in (0, 1)]
+    assert [len(one) for one in said] == [2, 2]
+
+
+def test_a_node_keeps_the_name_that_it_was_configured_with() -> None:
+    async def play(_bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+        await mother.send(10, "$F40")
+        await mother.send(10, "$R")
+        await asyncio.sleep(0.1)
+
+    recording = recorded(play)
+    assert {one.node for one in recording if isinstance(one, Moved)} == {10, 11}
+
+
+class Full(BytesIO):
+    """A disk that is full after so many bytes."""
+
+    def __init__(self, room: int) -> None:
+        super().__init__()
+        self._room = room
+
+    def write(self, data: object, /) -> int:
+        if self.tell() > self._room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        assert isinstance(data, bytes)
+        return super().write(data)
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_bus() -> None:
+    reports: list[str] = []
+
+    async def play(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
+        for _ in range(6):
+            await mother.send(10, "m10v300")
+            await asyncio.sleep(1)
+        reports.extend(report.text for report in bus.bus.reports)
+        assert recorder.fault is not None
+        assert bus.snapshot(10).position_pulses == 60
+
+    recorded(play, sink=Full(3_000))
+    assert reports.count("the recording ends here: No space left on device") == 1
+
+
+def test_lines_are_written_within_a_second_of_bus_time() -> None:
+    sink = BytesIO()
+
+    async def play(_bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
+        await mother.send(10, "m10v10")
+        assert not sink.getvalue().count(b'"is":"sent"')
+        await asyncio.sleep(1)
+        await mother.send(10, "m10v10")
+        assert sink.getvalue().count(b'"is":"sent"') == 2
+        recorder.flush()
+        assert sink.getvalue().count(b'"is":"sent"') == 4
+        assert recorder.tail[-1].encode() in sink.getvalue()
+
+    recorded(play, sink=sink)
+
+
+def test_one_that_is_closed_hears_nothing_any_more() -> None:
+    sink = BytesIO()
+
+    async def play(_bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
+        await mother.send(10, "m400")
+        recorder.close()
+        recorder.close()
+        before = sink.getvalue()
+        await mother.send(10, "m400")
+        await asyncio.sleep(2)
+        recorder.flush()
+        assert sink.getvalue() == before
+
+    assert recorded(play, sink=sink).track(10).position(0) == 0
+
+
+@pytest.mark.parametrize("settings", [{}, {"ustep": 3}, {"auto_micro": True, "ustep": 4}])
+def test_a_recorded_bus_does_what_it_does_unrecorded(settings: dict[str, object]) -> None:
+    seen: list[list[object]] = []
+    for with_recorder in (False, True):
+
+        async def main(record: bool = with_recorder) -> None:
+            configuration = Configuration(nodes=(10, 11), settings=settings)
+            async with open_bus(configuration) as bus:
+                mother = bus.mother()
+                recorder = Recorder(bus, BytesIO()) if record else None
+                await mother.send(10, "m400v120")
+                await mother.send(11, "m")
+                await asyncio.sleep(0.7)
+                answer = await mother.send(11, "s")
+                await asyncio.sleep(1)
+                seen.append([answer.round_trip, *bus.snapshots()])
+                if recorder is not None:
+                    recorder.close()
+
+        run_virtual(Kernel(), main())
+    assert seen[0] == seen[1]
