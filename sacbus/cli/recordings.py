@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -12,7 +13,7 @@ from sacbus.cli.options import WrongInput
 if TYPE_CHECKING:
     from sacbus.trace import Recording
 
-__all__ = ["opened", "span"]
+__all__ = ["opened", "picture_form", "span"]
 
 _UNITS: Final = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 _SPAN: Final = re.compile(r"(\d{1,9})(?:\.(\d{1,9}))?\s*(ns|us|ms|s)")
@@ -40,3 +41,19 @@ def opened(path: str) -> Recording:
         raise WrongInput(str(fault)) from fault
     except OSError as fault:
         raise WrongInput(f"{path}: {fault.strerror}, name a recording") from fault
+
+
+def picture_form(place: str | Path) -> str:
+    """The format in which ``--plot`` draws, once it is sure that it can; or one line, status 2."""
+    try:
+        # matplotlib is an extra.
+        from sacbus.drawing import PictureError, picture_format
+    except ImportError as fault:
+        raise WrongInput(
+            f"drawing needs matplotlib ({fault}), --plot, "
+            "install it: python -m pip install 'sacbus[plot]'"
+        ) from fault
+    try:
+        return picture_format(Path(place))
+    except PictureError as fault:
+        raise WrongInput(str(fault)) from fault
