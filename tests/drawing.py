@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import sys
 
+import pytest
 from matplotlib.figure import Figure
 
 
@@ -12,3 +14,15 @@ def load_fonts() -> None:
     figure = Figure(figsize=(1, 1))
     figure.text(0, 0, "a")
     figure.savefig(io.BytesIO(), format="png")
+
+
+def without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if it were not installed, and nobody in this process had drawn before."""
+    loaded = [name for name in sys.modules if name.startswith("matplotlib.")]
+    for name in ("matplotlib", *loaded):
+        monkeypatch.setitem(sys.modules, name, None)
+    for name in ("sacbus.drawing", "sacbus.plan.picture", "sacbus.trace.plots"):
+        package, _, last = name.rpartition(".")
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        if package in sys.modules:
+            monkeypatch.delattr(sys.modules[package], last, raising=False)

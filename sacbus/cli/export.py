@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from sacbus.cli.options import verbose
-from sacbus.cli.recordings import opened, span
+from sacbus.cli.options import WrongInput, verbose
+from sacbus.cli.recordings import opened, picture_form, span
+from sacbus.fresh import fresh_file
+
+if TYPE_CHECKING:
+    from sacbus.trace import Recording
 
 __all__ = ["export_command"]
+
+
+def _pair(
+    _ctx: click.Context, _param: click.Parameter, given: str | None
+) -> tuple[int, int] | None:
+    """Two addresses: ``10,11``."""
+    if given is None:
+        return None
+    found = re.fullmatch(r"\s*(\d{1,9})\s*,\s*(\d{1,9})\s*", given)
+    if found is None or found[1] == found[2]:
+        raise click.BadParameter(f"expected two nodes such as 10,11, got {given!r}")
+    return int(found[1]), int(found[2])
 
 
 @click.command("export")
@@ -42,6 +59,19 @@ __all__ = ["export_command"]
     help="What was said, as a capture for Wireshark (pcapng).",
 )
 @click.option(
+    "--plot",
+    "picture",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Velocity and position against time, and who talked when: .png or .svg.",
+)
+@click.option(
+    "--xy",
+    callback=_pair,
+    metavar="X,Y",
+    help="With --plot: the path of two nodes, and how straight it was.",
+)
+@click.option(
     "--every",
     callback=span,
     default="10ms",
@@ -56,6 +86,8 @@ def export_command(
     events: Path | None,
     positions: Path | None,
     pcap: Path | None,
+    picture: Path | None,
+    xy: tuple[int, int] | None,
     every: int,
 ) -> int:
     """Write a recording in other formats; several at once if wanted.
@@ -67,10 +99,15 @@ def export_command(
     from sacbus.trace.tables import write_events, write_positions
     from sacbus.trace.vcd import write_vcd
 
-    if vcd is None and events is None and positions is None and pcap is None:
-        raise click.UsageError("nothing to write: give --vcd, --csv, --positions or --pcap a file")
+    if all(path is None for path in (vcd, events, positions, pcap, picture)):
+        raise click.UsageError(
+            "nothing to write: give --vcd, --csv, --positions, --pcap or --plot a file"
+        )
+    if xy is not None and picture is None:
+        raise click.UsageError("--xy: expected only with --plot")
     if every == 0:
         raise click.BadParameter("expected a time above 0, got '0'", param_hint="--every")
+    form = None if picture is None else picture_form(picture)
     read = opened(recording)
     jobs: list[tuple[Path | None, str, Callable[[TextIO], int]]] = [
         (vcd, "changes of level", lambda out: write_vcd(read, out)),
@@ -86,8 +123,25 @@ def export_command(
         with pcap.open("wb") as file:
             written = write_pcapng(read, file)
         click.echo(f"{pcap}: {written} packets")
+    if picture is not None and form is not None:
+        _draw(read, picture, form, xy)
+        click.echo(f"{picture}: drawn")
     if not read.whole:
         click.echo(
             f"note: {recording} was cut off at {read.end / 1e9:.6f} s: it was not closed", err=True
         )
     return 0
+
+
+def _draw(recording: Recording, picture: Path, form: str, xy: tuple[int, int] | None) -> None:
+    from sacbus.picture_format import PictureError
+    from sacbus.trace.plots import draw_axes, draw_path
+
+    try:
+        with fresh_file(picture) as file:
+            if xy is None:
+                draw_axes(recording, file, form)
+            else:
+                draw_path(recording, file, form, xy)
+    except PictureError as fault:
+        raise WrongInput(str(fault)) from fault

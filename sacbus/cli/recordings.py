@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
 
 from sacbus.cli.options import WrongInput
+from sacbus.picture_format import PictureError, picture_format
 
 if TYPE_CHECKING:
     from sacbus.trace import Recording
 
-__all__ = ["opened", "span"]
+__all__ = ["opened", "picture_form", "span"]
 
 _UNITS: Final = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 _SPAN: Final = re.compile(r"(\d{1,9})(?:\.(\d{1,9}))?\s*(ns|us|ms|s)")
@@ -40,3 +42,19 @@ def opened(path: str) -> Recording:
         raise WrongInput(str(fault)) from fault
     except OSError as fault:
         raise WrongInput(f"{path}: {fault.strerror}, name a recording") from fault
+
+
+def picture_form(place: str | Path) -> str:
+    """The format in which ``--plot`` draws, once it is sure that it can; or one line, status 2."""
+    try:
+        form = picture_format(Path(place))
+    except PictureError as fault:
+        raise WrongInput(str(fault)) from fault
+    try:
+        import sacbus.drawing  # noqa: F401 (matplotlib is an extra)
+    except ImportError as fault:
+        raise WrongInput(
+            f"drawing needs matplotlib ({fault}), --plot, "
+            "install it: python -m pip install 'sacbus[plot]'"
+        ) from fault
+    return form

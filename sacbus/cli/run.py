@@ -14,6 +14,9 @@ from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
 import click
 
 from sacbus.cli.options import verbose
+from sacbus.cli.recordings import picture_form
+from sacbus.cli.report import Report
+from sacbus.fresh import fresh_file
 
 if TYPE_CHECKING:
     from sacbus.scenario import Result, Scenario
@@ -71,6 +74,19 @@ def _read_parameters(
     metavar="FILE",
     help="Write JUnit XML.",
 )
+@click.option(
+    "--plot",
+    "picture",
+    type=click.Path(dir_okay=False),
+    metavar="FILE",
+    help="Draw how the nodes moved and who talked: .png or .svg.",
+)
+@click.option(
+    "--report",
+    type=click.Path(dir_okay=False),
+    metavar="FILE",
+    help="Write a page to read: one HTML file, with pictures.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
 @verbose
 def run_command(
@@ -86,6 +102,8 @@ def run_command(
     vcd: str | None,
     pcap: str | None,
     junit: IO[str] | None,
+    picture: str | None,
+    report: str | None,
     as_json: bool,
 ) -> int:
     """Play scenarios in virtual time, and say what was not as expected.
@@ -95,13 +113,14 @@ def run_command(
 
     \b
     Example: sacbus run two-axes.toml --set speed=120 --junit results.xml
+             sacbus run scenarios/*.toml --report results.html
              sacbus run two-axes.toml --link /dev/ttyUSB0
     """
     from sacbus.scenario.junit import junit as in_junit
 
     if real and link is not None:
         raise click.UsageError("expected --real or --link, got both")
-    pages = {"--record": record, "--vcd": vcd, "--pcap": pcap}
+    pages = {"--record": record, "--vcd": vcd, "--pcap": pcap, "--plot": picture}
     kept = [option for option, path in pages.items() if path is not None]
     if kept and link is not None:
         raise click.UsageError(
@@ -116,12 +135,19 @@ def run_command(
         raise click.UsageError(
             f"{kept[0]}: expected one scenario of one case, got {len(chosen)}, use -k or --set"
         )
+    form = "" if picture is None else picture_form(picture)
+    page = None if report is None else Report(report, parameters, _how(seed, real, link, speed))
+    recorded = bool(kept) or (page is not None and link is None)
     results: list[Result] = []
     for scenario in chosen:
-        with _Progress(scenario) as progress, _opened(record, bool(kept)) as file:
+        with _Progress(scenario) as progress, _opened(record, recorded) as file:
             result = _played(scenario, real, link, speed, file, progress.come_to)
             if result.recording is not None:
                 _export(result.recording, vcd, pcap)
+                if picture is not None:
+                    _draw(result, result.recording, picture, form)
+            if page is not None:
+                page.add(result)
         results.append(result)
         if not as_json:
             _tell(result)
@@ -131,6 +157,8 @@ def run_command(
         click.echo(json.dumps({"scenarios": [one.as_json() for one in results]}))
     if junit is not None:
         junit.write(in_junit(results))
+    if page is not None:
+        page.write()
     return 0 if all(one.passed for one in results) else 1
 
 
@@ -204,6 +232,22 @@ def _export(recording: Recording, vcd: str | None, pcap: str | None) -> None:
 
         with Path(pcap).open("wb") as file:
             write_pcapng(recording, file)
+
+
+def _draw(result: Result, recording: Recording, picture: str, form: str) -> None:
+    from sacbus.trace.plots import draw_axes
+
+    with fresh_file(Path(picture)) as file:
+        draw_axes(recording, file, form, since=result.origin)
+
+
+def _how(seed: int | None, real: bool, link: str | None, speed: float | None) -> list[str]:
+    """The options that tell how a scenario is played."""
+    given = {"--seed": seed, "--link": link, "--speed": speed}
+    words = [
+        word for name, value in given.items() if value is not None for word in (name, str(value))
+    ]
+    return [*words, *["--real"][:real]]
 
 
 def _tell(result: Result) -> None:

@@ -19,8 +19,8 @@ import click
 from sacbus.fresh import fresh_file
 from sacbus.language import Defaults
 from sacbus.motion import Drive
+from sacbus.picture_format import PictureError, picture_format
 from sacbus.plan.entries import Commands, ListFile, PlanError, QueueFile, Source, Spool
-from sacbus.plan.picture_format import picture_format
 from sacbus.plan.pulses import PulseFormat, format_of, write_pulses
 from sacbus.plan.report import json_pieces, text_lines
 from sacbus.plan.sequence import Plan, Survey
@@ -135,7 +135,10 @@ def _drawing(place: str | None) -> Callable[[Plan, Survey, BinaryIO], None] | No
     """What draws in the format asked for; None when nothing is to be drawn."""
     if place is None:
         return None
-    form = picture_format(Path(place))
+    try:
+        form = picture_format(Path(place))
+    except PictureError as fault:
+        raise PlanError(str(fault)) from fault
     try:
         # matplotlib is an extra, and takes longer to import than most plans to make.
         from sacbus.plan import picture  # noqa: PLC0415

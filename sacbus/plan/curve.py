@@ -14,7 +14,7 @@ from typing import Final
 from sacbus.motion import TICKS_PER_US, Profile, State
 from sacbus.plan.sequence import Planned, Survey
 
-__all__ = ["Curve", "Mark", "curve_of"]
+__all__ = ["MOVING", "Curve", "Mark", "curve_of"]
 
 TICKS_PER_SECOND: Final = 1_000_000 * TICKS_PER_US
 

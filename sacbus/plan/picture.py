@@ -1,24 +1,29 @@
 """A plan as a picture: velocity, position and pulse rate against time, the states shaded.
 
-Owns the look, and that a picture of the same plan is the same file, byte for byte, whatever the
-user's own settings of matplotlib are. Importing this needs matplotlib, the extra ``plot``.
+Owns what is drawn of a plan; how it looks is ``sacbus/drawing.py``'s. A picture of the same plan is
+the same file, byte for byte. Importing this needs matplotlib, the extra ``plot``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import BinaryIO, Final
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import EngFormatter
 
-from sacbus.motion import Drive, State
-from sacbus.plan.curve import Curve, Mark, curve_of
+from sacbus.drawing import (
+    GREY,
+    LINE,
+    house_style,
+    save_figure,
+    time_unit,
+)
+from sacbus.drawing import SHADES as SHADES_BY_NAME
+from sacbus.motion import Drive
+from sacbus.plan.curve import MOVING, Curve, Mark, curve_of
 from sacbus.plan.entries import PlanError
 from sacbus.plan.report import seconds
 from sacbus.plan.sequence import Plan, Survey
@@ -28,10 +33,8 @@ __all__ = ["SHADES", "draw_plan", "house_style", "save_figure"]
 MOST_COMMANDS: Final = 5_000
 """More than a picture has columns of pixels for."""
 
-SHADES: Final = {State.ACCEL: "#bfe3d3", State.CRUISE: "#d3e6f5", State.DECEL: "#fbe0bd"}
-"""Light tints of the colours of Okabe and Ito, which the colour-blind tell apart as well."""
+SHADES: Final = {state: SHADES_BY_NAME[state.value] for state in MOVING}
 
-LINE: Final = "#1b2a41"
 CHARACTER: Final = 0.0072
 """Width of a character of a label, of the width of the plot."""
 
@@ -48,41 +51,10 @@ def draw_plan(plan: Plan, survey: Survey, file: BinaryIO, form: str) -> None:
         save_figure(_figure(curve, plan, survey), file, form)
 
 
-@contextmanager
-def house_style() -> Iterator[None]:
-    """What matplotlib is set to meanwhile, whatever it was before."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(
-            {
-                # Without a salt the names inside an SVG are drawn by chance.
-                "svg.hashsalt": "sacbus",
-                # Text stays text: a tenth of the size, and it can be searched and read aloud.
-                "svg.fonttype": "none",
-                "font.size": 10,
-                "axes.spines.top": False,
-                "axes.spines.right": False,
-                "axes.edgecolor": "#7a869a",
-                "axes.labelcolor": LINE,
-                "xtick.color": LINE,
-                "ytick.color": LINE,
-                "text.color": LINE,
-                "text.parse_math": False,
-            }
-        )
-        yield
-
-
-def save_figure(figure: Figure, file: BinaryIO, form: str) -> None:
-    """Write a figure without a date or a version in it."""
-    metadata = {"Software": None} if form == "png" else {"Date": None, "Creator": None}
-    figure.savefig(file, format=form, dpi=120, metadata=metadata)
-
-
 def _figure(curve: Curve, plan: Plan, survey: Survey) -> Figure:
     figure = Figure(figsize=(10, 6.6), layout="constrained")
     velocity, position, rate = figure.subplots(3, 1, sharex=True, height_ratios=(5, 4, 3))
-    factor, unit = _time_unit(curve.seconds[-1])
+    factor, unit = time_unit(curve.seconds[-1])
     times = [second * factor for second in curve.seconds]
     drive = plan.drive
     steps = [pulses / drive.m for pulses in curve.pulses]
@@ -90,7 +62,7 @@ def _figure(curve: Curve, plan: Plan, survey: Survey) -> Figure:
     for axes, values in ((velocity, curve.rpm), (position, steps), (rate, pulse_rates)):
         _shade(axes, curve, factor)
         axes.plot(times, values, color=LINE, linewidth=1.4, solid_joinstyle="miter")
-        axes.axhline(0, color="#7a869a", linewidth=0.8, zorder=0.5)
+        axes.axhline(0, color=GREY, linewidth=0.8, zorder=0.5)
         axes.margins(x=0)
     both_ways = min(curve.rpm) < 0 < max(curve.rpm)
     velocity.set_ylabel("velocity, RPM" + ("\nCW up, CCW down" if both_ways else ""))
@@ -177,12 +149,3 @@ def _title(plan: Plan, survey: Survey) -> str:
     return f"{planned.line}   {shares}, {'linear' if planned.motion.linear else 'harmonic'}" + (
         "" if survey.duration is None else f", {time}"
     )
-
-
-def _time_unit(whole: float) -> tuple[float, str]:
-    """What to count time in, and how many of it a second has."""
-    if whole < 0.1:
-        return 1_000.0, "ms"
-    if whole < 600:
-        return 1.0, "s"
-    return (1 / 60, "min") if whole < 36_000 else (1 / 3_600, "h")

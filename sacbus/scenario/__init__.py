@@ -16,7 +16,7 @@ from sacbus.scenario.expectations import (
 )
 from sacbus.scenario.quantity import Bounds, bounds, nanoseconds
 from sacbus.scenario.reading import read
-from sacbus.scenario.result import Failure, Result
+from sacbus.scenario.result import Failure, Met, Result
 from sacbus.scenario.run import run, run_on_link, run_real
 from sacbus.scenario.values import (
     Disturb,
@@ -42,6 +42,7 @@ __all__ = [
     "Failure",
     "Lift",
     "Mark",
+    "Met",
     "NodeIs",
     "PacketSeen",
     "Pause",

@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 from sacbus.kernel import SECOND, Ns
 from sacbus.scenario.result import Result
 
-__all__ = ["junit"]
+__all__ = ["junit", "told"]
 
 #: What XML 1.0 has no way to hold: control characters of a packet's body.
 _UNTELLABLE: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -26,22 +26,22 @@ def junit(results: Sequence[Result]) -> str:
     root = ET.Element("testsuites", _numbers(results))
     for file, group in groupby(results, key=lambda one: one.scenario.file):
         of_file = list(group)
-        suite = ET.SubElement(root, "testsuite", {"name": _told(file), **_numbers(of_file)})
+        suite = ET.SubElement(root, "testsuite", {"name": told(file), **_numbers(of_file)})
         for result in of_file:
             case = ET.SubElement(
                 suite,
                 "testcase",
                 {
-                    "classname": _told(file),
-                    "name": _told(result.name),
+                    "classname": told(file),
+                    "name": told(result.name),
                     "time": _seconds(result.ended),
                 },
             )
             for failure in result.failures:
-                told = ET.SubElement(
-                    case, "failure", {"type": "expectation", "message": _told(str(failure))}
+                element = ET.SubElement(
+                    case, "failure", {"type": "expectation", "message": told(str(failure))}
                 )
-                told.text = _told("\n".join(failure.lines()))
+                element.text = told("\n".join(failure.lines()))
     ET.indent(root)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
@@ -59,5 +59,6 @@ def _seconds(time: Ns) -> str:
     return f"{time / SECOND:.6f}"
 
 
-def _told(text: str) -> str:
+def told(text: str) -> str:
+    """The text, with what cannot stand in XML or in HTML told by its number."""
     return _UNTELLABLE.sub(lambda found: f"\\x{ord(found[0]):02x}", text)

@@ -24,7 +24,7 @@ from sacbus.scenario.asking import Polling, ask, outcome_of, told
 from sacbus.scenario.bench import Bench
 from sacbus.scenario.expectations import Counted, Shown
 from sacbus.scenario.judges import judge
-from sacbus.scenario.result import Failure, Result
+from sacbus.scenario.result import Failure, Met, Result
 from sacbus.scenario.values import (
     Disturb,
     Lift,
@@ -80,7 +80,7 @@ class Play:
 
     def begin(self) -> None:
         """Time 0 is now."""
-        self._origin = self._clock.now
+        self._origin = self.result.origin = self._clock.now
         for bench in self._benches.values():
             bench.begin(self._origin)
         steps = self._scenario.steps
@@ -184,6 +184,10 @@ class Play:
             return
         if got is not None:
             self._fail(index, expected, got)
+        elif expected:
+            step = self._scenario.steps[index]
+            when = self._clock.now - self._origin
+            self.result.met.append(Met(when, expected, step.name, step.place))
         self._open.discard(index)
         self._release(index, self._clock.now if at is None else at)
 
@@ -203,6 +207,11 @@ class Play:
         self.over = True
         self.result.ended = self._clock.now - self._origin
         self.result.counts = {name: bench.counts() for name, bench in self._benches.items()}
+        self.result.nodes = {
+            (name, address): panel.snapshot()
+            for name, bench in self._benches.items()
+            for address, panel in bench.panels.items()
+        }
         if self.when_over is not None:
             self.when_over()
 

@@ -87,6 +87,7 @@ class _CaseReader:
             nanoseconds(top.get("end")) if "end" in top.values else None,
             dict(varying),
             self._source.name,
+            dict(self._case),
         )
         if buses:
             for complaint in complaints(scenario):

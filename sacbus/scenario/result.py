@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sacbus.kernel import SECOND, US, Ns
+from sacbus.node import Snapshot
 from sacbus.scenario.values import Scenario
 from sacbus.trace import Recording
 
-__all__ = ["Failure", "Result", "case_words"]
+__all__ = ["Failure", "Met", "Result", "case_words"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +48,16 @@ class Failure:
         return told
 
 
+@dataclass(frozen=True, slots=True)
+class Met:
+    """An expectation that was met; ``when``, ``step`` and ``place`` as of a :class:`Failure`."""
+
+    when: Ns
+    expected: str
+    step: str = ""
+    place: str = ""
+
+
 @dataclass(slots=True)
 class Result:
     """What came of one scenario with one set of parameters; ``ended``: after how much bus time.
@@ -60,6 +71,11 @@ class Result:
     ended: Ns = 0
     expectations: int = 0
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    met: list[Met] = field(default_factory=list)
+    #: When it began, in the bus time of the recording.
+    origin: Ns = 0
+    #: What the nodes were like at its end, by bus and configured address; none behind a link.
+    nodes: Mapping[tuple[str, int], Snapshot] = field(default_factory=dict)
     #: What was recorded; None where nothing was.
     recording: Recording | None = None
 

@@ -173,7 +173,8 @@ class Scenario:
     """Buses, what is done to them and what is expected.
 
     ``end``: when it ends, with what is not over by then failed; None: when all steps are over.
-    ``case``: the values of its parameters, by name. ``file``: where it comes from.
+    ``case``: the values of the parameters that make several cases of it, by name; ``parameters``:
+    of all. ``file``: where it comes from.
     """
 
     title: str
@@ -182,3 +183,4 @@ class Scenario:
     end: Ns | None = None
     case: Mapping[str, object] = field(default_factory=dict)
     file: str = ""
+    parameters: Mapping[str, object] = field(default_factory=dict)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-import sacbus.plan
 from examples import pictures
-from tests.drawing import load_fonts
+from tests.drawing import load_fonts, without_matplotlib
 
 pytestmark = pytest.mark.slow
 
@@ -86,9 +84,7 @@ def test_a_directory_that_is_not_there_is_told_in_one_line(
 def test_without_matplotlib_it_says_what_to_install(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.delitem(sys.modules, "sacbus.plan.picture", raising=False)
-    monkeypatch.delattr(sacbus.plan, "picture", raising=False)
+    without_matplotlib(monkeypatch)
     assert pictures.main([str(tmp_path)]) == 2
     written = capsys.readouterr()
     assert (written.out, written.err.count("\n")) == ("", 1)

@@ -11,9 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import sacbus.plan
 from sacbus.cli import run
-from tests.drawing import load_fonts
+from tests.drawing import load_fonts, without_matplotlib
 
 Captured = pytest.CaptureFixture[str]
 
@@ -177,10 +176,7 @@ def test_a_picture_is_written_beside_the_report(capsys: Captured, directory: Pat
 def test_without_matplotlib_one_line_says_what_to_install(
     capsys: Captured, monkeypatch: pytest.MonkeyPatch, directory: Path
 ) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    # As if nobody in this process had drawn before.
-    monkeypatch.delitem(sys.modules, "sacbus.plan.picture", raising=False)
-    monkeypatch.delattr(sacbus.plan, "picture", raising=False)
+    without_matplotlib(monkeypatch)
     # Of a name that is wrong anyway that is told, which costs no installation.
     assert run(["plan", "m200", "--plot", "one.xyz"]) == 2
     assert "pictures are drawn as PNG or SVG, one.xyz" in capsys.readouterr().err
