@@ -18,7 +18,7 @@ from typing import Any, Final, TypeGuard
 
 from sacbus.language import QUEUE_LENGTH, Defaults, Motion, Parameter
 from sacbus.language.queue_file import QueueRow, WrongRow, read_rows
-from sacbus.motion import Drive, PullOut
+from sacbus.motion import Drive, PullOut, Timebase
 
 __all__ = ["BAUD", "PINS", "QUEUE", "Memory", "name_of"]
 
@@ -151,6 +151,10 @@ class Memory:
             cw=self.clockwise,
             full_step=not self.override,
         )
+
+    def external_clock(self, hz: int) -> Timebase | None:
+        """What times pulses instead of the oscillator, with ``hz`` at xclk; None: nothing does."""
+        return None if self.clock else Timebase.external(self.xfreq, hz)
 
     def drive(
         self,

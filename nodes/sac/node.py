@@ -23,7 +23,6 @@ from nodes.sac.settings import SacSettings
 from nodes.sac.terminal import TerminalPort
 from sacbus.kernel import LineRate, Ns
 from sacbus.language import Session, Stop
-from sacbus.motion import Drive, Timebase
 from sacbus.node import BOOT, OFF, Heard, Report, ReportKind, Snapshot
 from sacbus.wire import DC1, DC2, GENERAL_CALL
 
@@ -102,9 +101,9 @@ class SacNode:
     def _boot(self, now: Ns, *, cold: bool) -> None:
         """Begin as after power came, with what the EEPROM holds; not ``cold``: without the wait."""
         memory = self._memory = self.eeprom
-        self._engine = Engine(self._settings.oscillator, self._external_clock())
+        self._engine = Engine(self._settings.oscillator, memory.external_clock(self.xclk_hz))
         self._commands = CommandProcessor(
-            Session.start(memory.defaults()), self._drive(), self._engine, self
+            Session.start(memory.defaults()), self._settings.drive(memory), self._engine, self
         )
         if memory.queue is not None:
             self._commands.queue.load(memory.queue)
@@ -260,8 +259,10 @@ class SacNode:
         """
         before = self._memory
         memory = self._memory = self.eeprom
-        self._commands.reboot(Session.start(memory.defaults()), self._drive(), now)
-        self._commands.set_clock(self._external_clock() or self._settings.oscillator, now)
+        self._commands.reboot(Session.start(memory.defaults()), self._settings.drive(memory), now)
+        self._commands.set_clock(
+            memory.external_clock(self.xclk_hz) or self._settings.oscillator, now
+        )
         self._engine.change_microsteps(before.ustep, memory.ustep)
         self._set_up_ports()
         self._reset_session()
@@ -304,14 +305,6 @@ class SacNode:
     def _show_prompt(self) -> None:
         if self._ports is not None:
             self._ports.terminal.restart()
-
-    def _drive(self) -> Drive:
-        settings = self._settings
-        return self._memory.drive(
-            auto_micro=settings.auto_micro,
-            pull_in_rpm=settings.pull_in_rpm,
-            pull_out=settings.pull_out_curve,
-        )
 
     # ---- what its parts, and its pins, are asked for ----
 
@@ -473,16 +466,11 @@ class SacNode:
         """
         self.now = now
         self.xclk_hz = hz
-        clock = self._external_clock()
+        clock = self._memory.external_clock(self.xclk_hz)
         if clock is not None:
             self._commands.set_clock(clock, now)
         if self._onlookers:
             self.look(now)
-
-    def _external_clock(self) -> Timebase | None:
-        """What times pulses instead of the oscillator; None when nothing does."""
-        memory = self._memory
-        return None if memory.clock else Timebase.external(memory.xfreq, self.xclk_hz)
 
     def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
         """A packet was accepted."""

@@ -173,6 +173,14 @@ class SacSettings(NodeSettings):
         points = (point.partition(":") for point in self.pull_out.split(",") if point)
         return tuple((int(rpm), int(acceleration)) for rpm, _, acceleration in points)
 
+    def drive(self, memory: Memory) -> Drive:
+        """What the motion engine must know of a node's hardware, of which memory tells a part."""
+        return memory.drive(
+            auto_micro=self.auto_micro,
+            pull_in_rpm=self.pull_in_rpm,
+            pull_out=self.pull_out_curve,
+        )
+
     def factory_memory(self, address: int, line: int = BAUD) -> Memory:
         """The EEPROM at the first boot of a node at ``address``, on a line of ``line`` baud."""
         values = {one: int(getattr(self, name)) for name, one in _PARAMETERS.items()}
