@@ -168,6 +168,9 @@ def test_a_recording_is_drawn(
         (["--plot", "x.png", "--xy", "10,10"], "expected two nodes such as 10,11, got '10,10'"),
         (["--plot", "x.png", "--xy", "10,12"], "expected nodes 10 and 12 on one bus of it, got"),
         (["--csv", "x.csv", "--xy", "10,11"], "--xy: expected only with --plot"),
+        (["--csv", "x.csv", "--nodes", "10"], "--nodes: expected only with --plot"),
+        (["--plot", "x.png", "--nodes", "10", "--xy", "10,11"], "--nodes or --xy, got both"),
+        (["--plot", "x.png", "--nodes", "10-12"], "expected nodes that are in it, got 12"),
     ],
 )
 def test_what_cannot_be_drawn_is_one_line(

@@ -93,6 +93,22 @@ def test_a_recording_of_nothing_can_be_drawn() -> None:
     assert "nobody talked" in words(drawn(recorded(_nothing)))
 
 
+def test_nodes_may_be_chosen(axes: Recording) -> None:
+    file = io.BytesIO()
+    draw_axes(axes, file, "svg", nodes=(11,))
+    said = words(file.getvalue())
+    # Node 10 has talked all the same.
+    assert said.count("node 11") == 2
+    assert said.count("node 10") == 1
+    assert any(one.startswith("2 nodes, 2 moved, 1 drawn, ") for one in said)
+
+
+def test_more_nodes_than_can_be_seen_are_refused() -> None:
+    recording = recorded(_nothing, Configuration(nodes=tuple(range(10, 40))))
+    with pytest.raises(PictureError, match="expected 12 nodes at most in a picture, got 13"):
+        draw_axes(recording, io.BytesIO(), "svg", nodes=range(10, 23))
+
+
 async def _all_talk(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
     for address in range(10, 10 + MOST_TALKERS):
         await mother.send(address, "m20v300")
@@ -102,7 +118,7 @@ async def _all_talk(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
 def test_many_talkers_are_one_row_and_of_many_axes_the_title_tells() -> None:
     said = words(drawn(recorded(_all_talk, Configuration(nodes=tuple(range(10, 40))))))
     assert {"mother", "nodes"} <= set(said)
-    assert any(one.startswith("30 nodes, 14 moved, the first 12 drawn, ") for one in said)
+    assert any(one.startswith("30 nodes, 14 moved, 12 drawn, ") for one in said)
 
 
 def test_of_two_nodes_the_path_is_drawn_and_its_deviation_told(axes: Recording) -> None:

@@ -10,12 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from sacbus.bus import Drop
 from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.host import run_virtual
 from sacbus.kernel import SECOND, Kernel
-from sacbus.mother import Mother
+from sacbus.mother import Mother, NoAnswer
 from sacbus.trace import Recorder, read
 from sacbus.trace.records import Driven, Ended, Mark, Moved, Sent, Switched, Told, Turned
+from sacbus.wire import encode
 from tests.trace.rig import recorded, two_axes
 
 
@@ -61,6 +63,18 @@ def test_what_a_node_reports_and_a_turned_encoder_are_in_it() -> None:
     assert (told.node, told.kind, told.line) == (10, "refused", "zzz")
     (turned,) = [one for one in records if isinstance(one, Turned)]
     assert (turned.node, turned.detents) == (11, -2)
+
+
+def test_what_a_fault_did_is_told_as_sent_and_as_arrived() -> None:
+    async def play(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
+        bus.fault(Drop(1.0))
+        with pytest.raises(NoAnswer):
+            await mother.send(10, "V10")
+
+    sent = [one for one in recorded(play) if isinstance(one, Sent)]
+    assert sent
+    assert all((one.data, one.arrived) == (encode(10, 1, b"V10"), b"") for one in sent)
+    assert not any(one.collided for one in sent)
 
 
 def test_what_two_talkers_spoil_is_told_as_sent_and_as_arrived() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -77,8 +78,10 @@ def test_of_a_long_recording_each_column_keeps_its_extremes() -> None:
     assert rpm.max() == pytest.approx(400, abs=1)
     assert rpm.min() == pytest.approx(-400, abs=1)
     assert steps.max() == 50
+    column = (strips.last - strips.first) // COLUMNS
     for spans in stretches(track, strips.first, strips.last).values():
-        assert len(spans) <= COLUMNS
+        for (begin, length), (following, _) in pairwise(spans):
+            assert following - begin - length > column
 
 
 def test_of_ticks_in_one_column_the_longest_is_drawn() -> None:
@@ -101,3 +104,10 @@ def test_of_many_nodes_those_are_drawn_that_moved_first() -> None:
     strips = strips_of(recorded(_all_move, Configuration(nodes=tuple(range(10, 40)))))
     assert strips.moved == 20
     assert list(strips.tracks) == [(0, address) for address in range(10, 10 + MOST_NODES)]
+
+
+def test_others_are_drawn_where_they_are_asked_for() -> None:
+    recording = recorded(_all_move, Configuration(nodes=tuple(range(10, 40))))
+    strips = strips_of(recording, wanted=(29, 35))
+    assert strips.moved == 20
+    assert list(strips.tracks) == [(0, 29), (0, 35)]
