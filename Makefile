@@ -30,9 +30,11 @@ help:
 	@echo "make fuzz      ten million random lines through both ports of nodes (ARGS=\"--seed 5\")"
 	@echo "make clean     remove what the above have made"
 
-# exec: the shell steps aside, so that Ctrl-C and the exit status are sacbus's own.
+# exec: the shell steps aside, so that signals and the exit status are sacbus's own. But for
+# Ctrl-C, the usual end: with sacbus's own 130 make would call that an error.
 serve: $(VENV)/run
-	@exec $(BIN)/sacbus serve $(if $(CONFIG),'$(CONFIG)',--pty $(PTY)) $(ARGS)
+	@exec $(BIN)/python -c 'from sacbus.__main__ import main; main(interrupted=0)' \
+	  serve $(if $(CONFIG),'$(CONFIG)',$(if $(PTY),--pty '$(PTY)')) $(ARGS)
 
 test: $(VENV)/dev
 	@$(BIN)/python -m pytest $(ARGS)

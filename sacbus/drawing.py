@@ -1,6 +1,6 @@
 """The look of pictures: what is drawn by any part of sacbus looks alike, and the same every time.
 
-Owns the colours, the settings of matplotlib whatever the user's own are, the formats, and that no
+Owns the colours, the settings of matplotlib whatever the user's own are, and that no
 date or version gets into a file. Importing this needs matplotlib, the extra ``plot``.
 """
 
@@ -8,20 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import BinaryIO, Final
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
 __all__ = [
-    "FORMATS",
     "GREY",
     "LINE",
     "SHADES",
-    "PictureError",
     "house_style",
-    "picture_format",
     "save_figure",
     "time_unit",
 ]
@@ -31,24 +27,6 @@ SHADES: Final = {"ACCEL": "#bfe3d3", "CRUISE": "#d3e6f5", "DECEL": "#fbe0bd"}
 
 LINE: Final = "#1b2a41"
 GREY: Final = "#7a869a"
-
-FORMATS: Final = {".png": "png", ".svg": "svg"}
-"""By the ending of a file's name."""
-
-
-class PictureError(ValueError):
-    """Something that cannot be drawn: what, where, what to do."""
-
-
-def picture_format(path: Path) -> str:
-    """The format that a file's ending asks for; :class:`PictureError` for one not drawn."""
-    form = FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise PictureError(
-            f"pictures are drawn as PNG or SVG, {path}, give a name that ends in "
-            + " or ".join(FORMATS)
-        )
-    return form
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from functools import partial
 from random import Random
 
-from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, Fault, FaultOn, LivePort, Port
+from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, Fault, FaultOn, LivePort, NoSuchNode, Port
 from sacbus.configuration import Configuration, NodeAt
 from sacbus.console import Console
 from sacbus.host import Host, VirtualHost
@@ -25,7 +25,18 @@ from sacbus.panel import Deed, Panel
 from sacbus.saving import AtOnce, Saving, Soon
 from sacbus.state import StateDirectory, StateError
 
-__all__ = ["HostedBus"]
+__all__ = ["HostedBus", "NoTerminal"]
+
+
+class NoTerminal(KeyError):
+    """A node whose kind has no terminal port was asked for it."""
+
+    def __init__(self, address: int) -> None:
+        super().__init__(address)
+        self.address = address
+
+    def __str__(self) -> str:  # KeyError's own is the repr of what was asked for
+        return f"node {self.address} has no terminal port"
 
 
 class HostedBus:
@@ -66,11 +77,11 @@ class HostedBus:
         return [node.snapshot(now) for node in self.bus.nodes]
 
     def snapshot(self, address: int) -> Snapshot:
-        """One node as it is now; KeyError when there is none."""
+        """One node as it is now; NoSuchNode when there is none."""
         return self.bus.node(address).snapshot(self.now())
 
     def panel(self, address: int) -> Panel:
-        """A node's pins, encoder, switch and terminal; KeyError when there is no such node."""
+        """A node's pins, encoder, switch and terminal; NoSuchNode when there is none."""
         return self._panel(self.bus.node(address))
 
     def fault(self, fault: Fault) -> FaultOn:
@@ -84,7 +95,9 @@ class HostedBus:
         return on
 
     def terminal(self, address: int) -> Console:
-        """The terminal of a node, to type at and to read; KeyError when there is none.
+        """The terminal of a node, to type at and to read.
+
+        NoSuchNode when there is no such node, NoTerminal when it has none.
 
         What the node shows is kept for who reads it from the first time on that this is called.
         """
@@ -95,19 +108,18 @@ class HostedBus:
     def attach_terminal(self, address: int, link: Link) -> None:
         """Open a link to the terminal of the node that is configured at ``address``.
 
-        LinkError when the link cannot be had, KeyError when the node has no terminal, as in
-        :meth:`terminal`. It is closed with the bus.
+        LinkError when the link cannot be had; else as :meth:`terminal`. It is closed with the bus.
         """
         node = next((node for at, node in self.configured if at.address == address), None)
         if node is None:
-            raise KeyError(f"no node {address} on {self.bus.name}")
+            raise NoSuchNode(address, self.bus.name, [at.address for at, _ in self.configured])
         self._console(node).open(link)
         self.terminals[address] = link
 
     def _console(self, node: Node) -> Console:
         console = self._panel(node).console
         if console is None:
-            raise KeyError(f"node {node.address} has no terminal port")
+            raise NoTerminal(node.address)
         return console
 
     def _panel(self, node: Node) -> Panel:

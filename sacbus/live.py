@@ -107,25 +107,28 @@ class Screen:
     def __init__(self) -> None:
         self._drawn: list[str] = []
 
-    def draw(self, lines: Sequence[str]) -> str:
-        """What to write to the terminal to see ``lines`` in place of those of the last time."""
+    def draw(self, lines: Sequence[str], columns: int) -> str:
+        """What to write to see ``lines`` in place of those of the last time.
+
+        ``columns`` is how wide the terminal is now. One that has been made narrower has wrapped the
+        lines of the last time, which then take more of its rows.
+        """
         if list(lines) == self._drawn:
             return ""
-        text = self._erase() + "".join(f"{line}\n" for line in lines)
+        text = self._erase(columns) + "".join(f"{line}\n" for line in lines)
         self._drawn = list(lines)
         return text
 
-    def above(self, text: str) -> str:
-        """What to write to have ``text`` stay above the lines."""
-        kept = self._drawn
-        erased = self._erase()
-        self._drawn = kept
-        return f"{erased}{text}\n" + "".join(f"{line}\n" for line in kept)
+    def above(self, text: str, columns: int) -> str:
+        """What to write to have ``text`` stay above the lines; ``columns`` as in :meth:`draw`."""
+        again = "".join(f"{line}\n" for line in self._drawn)
+        return f"{self._erase(columns)}{text}\n{again}"
 
-    def _erase(self) -> str:
+    def _erase(self, columns: int) -> str:
         # Up to the first drawn line, then clear to the end of the screen.
         # From the line's start: the terminal may have echoed a key, as it does Ctrl-C.
-        return f"\r\x1b[{len(self._drawn)}A\x1b[J" if self._drawn else ""
+        rows = sum(max(-(-len(click.unstyle(line)) // columns), 1) for line in self._drawn)
+        return f"\r\x1b[{rows}A\x1b[J" if rows else ""
 
 
 def _cells(snapshot: Snapshot) -> tuple[str, ...]:

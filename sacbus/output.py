@@ -205,17 +205,17 @@ class Table(Lines):
         if self._reports > REPORTS_A_REFRESH:
             self._unseen += 1
         else:
-            self.say(self._screen.above(self._told(bus, report)))
+            self.say(self._screen.above(self._told(bus, report), _columns()))
 
     def late(self, bus: HostedBus, late: Ns) -> None:
         """Above the table too."""
-        self.say(self._screen.above(self._told_late(bus, late)))
+        self.say(self._screen.above(self._told_late(bus, late), _columns()))
 
     def drawing(self) -> Job[None]:
         """Draw it again."""
         self._reports = 0
         if self._unseen:
-            self.say(self._screen.above(f"… and {self._unseen} more reports"))
+            self.say(self._screen.above(f"… and {self._unseen} more reports", _columns()))
             self._unseen = 0
         size = shutil.get_terminal_size()
         columns = size.columns - 1
@@ -229,7 +229,7 @@ class Table(Lines):
             name = f"{bus.bus.name}: " if len(self._buses) > 1 else ""
             lines.append(load.line(name, columns))
         yield
-        self.say(self._screen.draw(lines))
+        self.say(self._screen.draw(lines, _columns()))
 
 
 class _Load:
@@ -261,6 +261,11 @@ class _Load:
         if len(", ".join(parts)) > columns:
             del parts[2]  # what is least missed
         return ", ".join(parts)[:columns]
+
+
+def _columns() -> int:
+    """How wide the terminal is, asked for each time: who looks at it may change that."""
+    return shutil.get_terminal_size().columns
 
 
 Output = Lines | Json | Table

@@ -17,7 +17,9 @@ settings.register_profile(
 )
 settings.load_profile("dev")
 
-# Under nohup the tests' own processes would inherit that hanging up is ignored.
+# Under nohup, or in the background of a shell, the tests' own processes would inherit that hanging
+# up, or Ctrl-C, is ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 if hasattr(signal, "SIGHUP"):
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 

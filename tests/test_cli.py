@@ -18,7 +18,7 @@ import pytest
 import serial
 
 from sacbus import __version__
-from sacbus.cli import main, root, run
+from sacbus.cli import root, run
 from tests.serving import PATIENCE, Sacbus, served, started, until
 
 NAK_10 = bytes.fromhex("02 01 0a 15")
@@ -102,13 +102,6 @@ def test_without_a_command_the_help_is_shown_and_nothing_was_done(capsys: Captur
     assert "serve" in written.err
 
 
-def test_main_exits_with_the_commands_status(capsys: Captured) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["frobnicate"])
-    assert ended.value.code == 2
-    assert "error: " in capsys.readouterr().err
-
-
 WRONG = [
     (["frobnicate"], 2, "No such command 'frobnicate'.*, see sacbus --help"),
     (["--frob"], 2, "No such option.*--frob.*, see sacbus --help"),
@@ -157,6 +150,35 @@ def test_what_is_wrong_is_told_in_one_line(
     error = the_error(capsys)
     assert "Traceback" not in error
     assert re.search(what, error), error
+
+
+ENDLESS = "m" * 3_000
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [ENDLESS],
+        ["kinds", ENDLESS],
+        ["send", "/dev/null", f"10{ENDLESS}→"],
+        ["send", "/dev/null", ENDLESS],
+        ["send", "/dev/null", "9" * 3_000],
+        ["send", ENDLESS, "10m400"],
+        ["plan", ENDLESS],
+        ["plan", "m", ENDLESS],
+        ["plan", "m", "m" + " x" * 3_000],
+        ["serve", "--set", ENDLESS],
+        ["serve", "--set", f"ustep={ENDLESS}", "--ephemeral"],
+        ["serve", "--kind", ENDLESS, "--ephemeral"],
+        ["check", ENDLESS],
+    ],
+    ids=lambda arguments: " ".join(arguments)[:30],
+)
+def test_what_was_given_is_quoted_but_not_at_any_length(
+    capsys: Captured, arguments: list[str]
+) -> None:
+    assert run(arguments) != 0
+    assert len(capsys.readouterr().err) < 500
 
 
 @pytest.mark.parametrize(
@@ -357,7 +379,7 @@ def test_the_installed_script_is_the_same_program() -> None:
 @pytest.mark.slow
 def test_completion_for_the_shell_is_there() -> None:
     ended = subprocess.run(
-        [sys.executable, "-c", "from sacbus.cli import main; main()"],
+        [sys.executable, "-c", "from sacbus.__main__ import main; main()"],
         env={**os.environ, "_SACBUS_COMPLETE": "bash_source"},
         capture_output=True,
         timeout=PATIENCE,

@@ -615,3 +615,31 @@ def test_an_event_that_fails_does_not_stop_the_clock() -> None:
         return ran
 
     assert asyncio.run(scene()) == [5 * MS]
+
+
+def test_a_coroutine_that_an_event_wakes_finds_the_clock_at_that_event() -> None:
+    kernel = Kernel()
+
+    async def main() -> list[Ns]:
+        loop = asyncio.get_running_loop()
+        found = []
+        for number in range(20):  # beside them, events that nobody waits for
+            kernel.at(number * MS, lambda: None)
+        for wake in ("future", "timer", "thread-safe"):
+            woken: asyncio.Future[None] = loop.create_future()
+            match wake:
+                case "future":
+                    kernel.at(kernel.now + 2_500 * US, woken.set_result, None)
+                case "timer":
+                    kernel.at(kernel.now + 2_500 * US, loop.call_later, 0, woken.set_result, None)
+                case _:
+                    wakes = loop.call_soon_threadsafe
+                    kernel.at(kernel.now + 2_500 * US, wakes, woken.set_result, None)
+            await woken
+            found.append(kernel.now)
+        return found
+
+    found = run_virtual(kernel, main())
+    assert found[0] == 2_500 * US
+    assert found[1] - found[0] in (2_500 * US, 2_500 * US + 1)
+    assert found[2] - found[1] == 2_500 * US

@@ -195,15 +195,15 @@ def test_lines_are_drawn_in_place_of_the_last_ones() -> None:
     screen, terminal = Screen(), Terminal()
     terminal.write("connect to /tmp/sacbus\n")
     for lines in (["a", "b"], ["c", "d"], ["e"], ["f", "g", "h"]):
-        terminal.write(screen.draw(lines))
+        terminal.write(screen.draw(lines, 80))
         assert terminal.lines == ["connect to /tmp/sacbus", *lines]
 
 
 def test_nothing_is_written_when_nothing_has_changed() -> None:
     screen = Screen()
-    assert screen.draw(["a"]) != ""
-    assert screen.draw(["a"]) == ""
-    assert screen.draw(["b"]) != ""
+    assert screen.draw(["a"], 80) != ""
+    assert screen.draw(["a"], 80) == ""
+    assert screen.draw(["b"], 80) != ""
 
 
 @given(
@@ -217,9 +217,59 @@ def test_reports_stay_above_and_the_table_below(happens: list[str | list[str]]) 
     drawn: list[str] = []
     for one in happens:
         if isinstance(one, str):
-            terminal.write(screen.above(f"report {one}"))
+            terminal.write(screen.above(f"report {one}", 80))
             reports.append(f"report {one}")
         else:
-            terminal.write(screen.draw(one))
+            terminal.write(screen.draw(one, 80))
             drawn = one
     assert terminal.lines == reports + drawn
+
+
+class Reflowing:
+    """A terminal that wraps what is too long, anew whenever its width is changed."""
+
+    def __init__(self, columns: int) -> None:
+        self.columns = columns
+        self.lines: list[str] = []
+
+    @property
+    def rows(self) -> list[str]:
+        width = self.columns
+        return [
+            line[at : at + width]
+            for line in self.lines
+            for at in range(0, max(len(line), 1), width)
+        ]
+
+    def write(self, text: str) -> None:
+        plain = re.sub(r"\x1b\[\d*m", "", text)
+        for up, rest in re.findall(r"(?:\r\x1b\[(\d+)A\x1b\[J)?([^\x1b\r]*)", plain):
+            for _ in range(int(up or 0)):
+                # A row is the end of a line that may begin further up.
+                line = self.lines.pop()
+                if above := (max(len(line), 1) - 1) // self.columns * self.columns:
+                    self.lines.append(line[:above])
+            self.lines += rest.splitlines()
+
+
+def test_a_terminal_made_narrower_and_wider_keeps_nothing_of_old_tables() -> None:
+    screen, terminal = Screen(), Reflowing(80)
+    terminal.write("connect to /tmp/sacbus\n")
+    nodes = [a_node(10, state="CRUISE", current="m400v120", acks=3), a_node(11)]
+    for columns in (80, 50, 12, 100, 50):
+        terminal.columns = columns
+        nodes[0] = a_node(10, state="CRUISE", steps=columns, current="m400v120", acks=3)
+        lines = drawn(nodes, columns - 1, 8, colour=True)
+        terminal.write(screen.draw(lines, columns))
+        plain = [re.sub(r"\x1b\[\d*m", "", line) for line in lines]
+        assert terminal.lines == ["connect to /tmp/sacbus", *plain]
+
+
+def test_a_report_on_a_terminal_made_narrower_takes_nothing_with_it() -> None:
+    screen, terminal = Screen(), Reflowing(20)
+    terminal.write(screen.draw(["a" * 19, "", "b"], 20))
+    terminal.columns = 7
+    terminal.write(screen.above("first", 7))
+    terminal.columns = 30
+    terminal.write(screen.above("second", 30))
+    assert terminal.lines == ["first", "second", "a" * 19, "", "b"]

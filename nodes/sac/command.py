@@ -214,7 +214,7 @@ class CommandProcessor:
         self._run.see_what_is_due()
         self.session = session
         self.debug = False
-        self._run.reboot(drive, session.defaults, now)
+        self._run.reboot(drive, session.defaults)
 
     # ---- commands ----
 

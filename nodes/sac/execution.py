@@ -25,6 +25,7 @@ from sacbus.motion import (
     gap_passes,
     load_ticks,
     plan,
+    transition_warnings,
 )
 from sacbus.node import ReportKind
 
@@ -53,6 +54,7 @@ class Execution:
     """
 
     __slots__ = (
+        "_before",
         "_drive",
         "_engine",
         "_free",
@@ -98,6 +100,8 @@ class Execution:
         #: When the node is free to load: now, or when it has told of the last end.
         self._free: Ns = 0
         self._kept_rpm: Rpm = 0
+        #: The command that kept it; None when there is none.
+        self._before: Profile | None = None
         self._last_end: Ns = 0
         self._last_period = 0
         #: The command that was loaded last.
@@ -127,7 +131,7 @@ class Execution:
             self.tells_ops = on
             self._untold = on and self.waits(now)
 
-    def reboot(self, drive: Drive, defaults: Defaults, now: Ns) -> None:
+    def reboot(self, drive: Drive, defaults: Defaults) -> None:
         """Go on with other parameters, at rest. Nothing may run or be held."""
         self._drive = drive
         self.defaults = defaults
@@ -211,7 +215,8 @@ class Execution:
         profile = plan(motion, self._drive, kept)
         self.current = motion
         engine.start(profile, ready, wait)
-        self.warn(profile)
+        before, self._before = self._before, None
+        self.warn(profile, transition_warnings(before, profile) if kept and before else ())
         if not engine.clock.runs:
             self._told.tell_of_command(
                 ReportKind.WARNING,
@@ -220,19 +225,20 @@ class Execution:
             )
         self._untold = self.tells_ops
 
-    def warn(self, profile: Profile) -> None:
+    def warn(self, profile: Profile, beginning: tuple[str, ...] = ()) -> None:
         """Report what a profile asks of the hardware that it cannot give.
 
-        Of a command that comes again and again in a loop once only: the rest would be drowned.
+        ``beginning``: what is to be said of where it begins. Of a command that comes again and
+        again in a loop once only: the rest would be drowned.
         """
-        warnings = profile.warnings
+        warnings = *beginning, *map(str, profile.warnings)
         if warnings and self.source is Source.LOOP:
             if profile.motion in self._warned:
                 return
             self._warned = {*self._warned, profile.motion}
         for warning in warnings:
             self._told.tell_of_command(
-                ReportKind.WARNING, str(warning), shortest(profile.motion, self.defaults)
+                ReportKind.WARNING, warning, shortest(profile.motion, self.defaults)
             )
 
     # ---- on the way ----
@@ -288,6 +294,7 @@ class Execution:
     def forget_velocity(self) -> None:
         """Whatever comes next begins from rest."""
         self._kept_rpm = 0
+        self._before = None
 
     def _drop_unstarted(self) -> None:
         """The command's first pulse has not come: it never will."""
@@ -318,6 +325,7 @@ class Execution:
         if kept:
             self._last_end = end
             self._last_period = profile.last_period
+            self._before = profile
         self.stopping = False
         self.current = None
         self.source = Source.STANDBY

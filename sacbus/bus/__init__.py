@@ -1,7 +1,7 @@
 """The line itself: transmissions, collisions, faults, nodes, ports. Synchronous, in kernel time."""
 
 from sacbus.bus.around import Listener
-from sacbus.bus.bus import Bus
+from sacbus.bus.bus import Bus, NoSuchNode
 from sacbus.bus.damage import BitErrors, Delay, Drop, Duplicate, SwappedReply
 from sacbus.bus.disturbers import Babble, NoiseBursts
 from sacbus.bus.fault import Fault, FaultError, FaultOn
@@ -37,6 +37,7 @@ __all__ = [
     "Listener",
     "LivePort",
     "Medium",
+    "NoSuchNode",
     "NoiseBursts",
     "Passage",
     "Port",

@@ -14,13 +14,32 @@ from sacbus.bus.medium import Medium
 from sacbus.kernel import Appointment, Kernel, LineRate, Ns
 from sacbus.node import Heard, Node, Protocol, Report
 
-__all__ = ["Bus"]
+__all__ = ["Bus", "NoSuchNode"]
 
 #: Reports kept for whoever asks later; older ones are only counted.
 REPORTS_KEPT: Final = 1_000
 
+#: Addresses that are told to who asked for a wrong one.
+TOLD: Final = 10
+
 #: Appointments of one node that may stand at a time; two are usual.
 STANDING: Final = 8
+
+
+class NoSuchNode(KeyError):
+    """There is no node at an address that somebody asked for; the line says which there are."""
+
+    def __init__(self, address: object, bus: str, present: Sequence[int]) -> None:
+        super().__init__(address)
+        self.address = address
+        self.bus = bus
+        self.present = tuple(present)
+
+    def __str__(self) -> str:  # KeyError's own is the repr of what was asked for
+        shown = ", ".join(map(str, self.present[:TOLD])) or "no nodes"
+        more = len(self.present) - TOLD
+        tail = f" and {more} more" if more > 0 else ""
+        return f"no node {self.address!r} on {self.bus}, expected one of its own: {shown}{tail}"
 
 
 class _Seat:
@@ -95,11 +114,11 @@ class Bus:
         return (seat.node for seat in self._routes.seats)
 
     def node(self, address: int) -> Node:
-        """The first node with that address; KeyError names it."""
+        """The first node with that address; :class:`NoSuchNode` names it."""
         for node in self.nodes:
             if node.address == address:
                 return node
-        raise KeyError(f"no node {address} on {self.name}")
+        raise NoSuchNode(address, self.name, [node.address for node in self.nodes])
 
     def touch(self, node: Node) -> None:
         """Ask a node anew when it wants to be woken, after it was driven from outside the bus."""

@@ -10,8 +10,6 @@ import contextlib
 import os
 import sys
 import traceback
-from collections.abc import Sequence
-from typing import NoReturn
 
 import click
 
@@ -23,7 +21,7 @@ from sacbus.cli.eeprom import eeprom_group
 from sacbus.cli.export import export_command
 from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
-from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, help_unless_asked, verbose
+from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, help_unless_asked, shortened, verbose
 from sacbus.cli.plan import plan_command
 from sacbus.cli.queue import queue_group
 from sacbus.cli.run import run_command
@@ -31,7 +29,7 @@ from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
 from sacbus.cli.terminal import terminal_command
 
-__all__ = ["main", "run"]
+__all__ = ["root", "run"]
 
 
 @click.group(
@@ -67,11 +65,6 @@ for command in (
     dissector_command,
 ):
     root.add_command(command)
-
-
-def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """The entry point ``sacbus``: runs a command and exits with its status."""
-    sys.exit(run(sys.argv[1:] if arguments is None else list(arguments)))
 
 
 def run(arguments: list[str]) -> int:
@@ -136,5 +129,5 @@ def _failed(text: str, status: int, verbose: bool) -> int:
     with contextlib.suppress(OSError):
         if verbose:
             traceback.print_exc()
-        click.echo(f"error: {text}", err=True)
+        click.echo(shortened(f"error: {text}"), err=True)
     return status

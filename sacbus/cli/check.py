@@ -6,7 +6,7 @@ import json
 
 import click
 
-from sacbus.cli.options import USAGE_STATUS, verbose
+from sacbus.cli.options import USAGE_STATUS, shortened, verbose
 
 __all__ = ["check_command"]
 
@@ -38,5 +38,5 @@ def check_command(configs: tuple[str, ...], as_json: bool) -> int:
         for warning in one.warnings:
             click.echo(f"warning: {warning}", err=True)
         for mistake in one.mistakes:
-            click.echo(f"error: {mistake}", err=True)
+            click.echo(shortened(f"error: {mistake}"), err=True)
     return USAGE_STATUS if any(one.mistakes for one in found) else 0

@@ -154,7 +154,7 @@ def _draw(
     nodes: tuple[int, ...],
     xy: tuple[int, int] | None,
 ) -> None:
-    from sacbus.drawing import PictureError
+    from sacbus.picture_format import PictureError
     from sacbus.trace.plots import draw_axes, draw_path
 
     try:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any, Final, TypeVar
 
 import click
 
-from sacbus.config.notation import NotationError, addresses, endpoint
+from sacbus.config.notation import NotationError, addresses, endpoint, quoted
 
 __all__ = [
     "INTERRUPTED",
@@ -19,6 +20,7 @@ __all__ = [
     "read_addresses",
     "read_endpoints",
     "read_settings",
+    "shortened",
     "verbose",
 ]
 
@@ -31,10 +33,20 @@ USAGE_STATUS: Final = 2
 NO_ANSWER_STATUS: Final = 4
 
 
+#: A word of 300 characters or more, and what stands behind it. No message is made of such words,
+#: but what was given may be, and the system and click quote that whole.
+_ENDLESS: Final = re.compile(r"(\S{57})\S{243,}?([,;:')\"]*)(?!\S)")
+
+
 class WrongInput(click.ClickException):
     """What stands in a file or a command is wrong, as an argument is; no help tells more of it."""
 
     exit_code = USAGE_STATUS
+
+
+def shortened(message: str) -> str:
+    """A message whose words are not of any length, whatever was given."""
+    return _ENDLESS.sub(r"\1…\2", message)
 
 
 def verbose(command: _F) -> _F:
@@ -94,7 +106,7 @@ def read_settings(
     for text in given:
         name, equals, value = text.partition("=")
         if not equals or not name:
-            raise click.BadParameter(f"expected NAME=VALUE, got {text!r}")
+            raise click.BadParameter(f"expected NAME=VALUE, got {quoted(text)}")
         if value.lower() in ("true", "false"):
             settings[name] = value.lower() == "true"
         else:

@@ -14,7 +14,12 @@ __all__ = ["plan_command"]
 @click.command("plan")
 @click.argument("commands", nargs=-1, metavar="[COMMAND]...")
 @click.option("--queue", metavar="FILE.csv", help="Plan a queue file, as the companion writes it.")
-@click.option("--list", "one_shots", metavar="FILE", help="Plan a list of commands, a line each.")
+@click.option(
+    "--list",
+    "one_shots",
+    metavar="FILE",
+    help="Plan a list of commands, a line each; # begins a comment.",
+)
 @click.option("--table", is_flag=True, help="Steps of linear ramps: the manual's Appendix D.")
 @click.option(
     "--loop",
@@ -60,7 +65,12 @@ __all__ = ["plan_command"]
     help="Whether a kept velocity is lost when the next command comes too late.",
 )
 @click.option("--pulses", metavar="FILE", help="Write the time of every pulse: .csv, .npy or -.")
-@click.option("--plot", "picture", metavar="FILE", help="Draw it: .png or .svg.")
+@click.option(
+    "--plot",
+    "picture",
+    metavar="FILE",
+    help="Draw it, .png or .svg; needs: pip install 'sacbus[plot]'.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
 @verbose
 def plan_command(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from sacbus.cli.options import WrongInput
+from sacbus.picture_format import PictureError, picture_format
 
 if TYPE_CHECKING:
     from sacbus.trace import Recording
@@ -46,14 +47,14 @@ def opened(path: str) -> Recording:
 def picture_form(place: str | Path) -> str:
     """The format in which ``--plot`` draws, once it is sure that it can; or one line, status 2."""
     try:
-        # matplotlib is an extra.
-        from sacbus.drawing import PictureError, picture_format
+        form = picture_format(Path(place))
+    except PictureError as fault:
+        raise WrongInput(str(fault)) from fault
+    try:
+        import sacbus.drawing  # noqa: F401 (matplotlib is an extra)
     except ImportError as fault:
         raise WrongInput(
             f"drawing needs matplotlib ({fault}), --plot, "
             "install it: python -m pip install 'sacbus[plot]'"
         ) from fault
-    try:
-        return picture_format(Path(place))
-    except PictureError as fault:
-        raise WrongInput(str(fault)) from fault
+    return form

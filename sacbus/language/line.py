@@ -14,7 +14,7 @@ from typing import Final
 
 from .commands import BARE, NO_RAMP, QUEUE_LENGTH, Bare
 
-__all__ = ["DIGITS", "NOTHING", "Line", "Remark", "end_of", "low_byte", "short"]
+__all__ = ["DIGITS", "NOTHING", "Line", "Remark", "end_of", "low_byte", "quoted", "short"]
 
 NOTHING: Final = "the line does nothing"
 DIGITS: Final = re.compile(r"[0-9]*")
@@ -150,6 +150,11 @@ def low_byte(digits: str) -> int:
     """The low 8 bits of a number of any length, of which SAC keeps no more where it has 8."""
     # 10**8 is a multiple of 256: the low 8 bits are those of the last 8 digits.
     return int(digits[-8:]) & 0xFF
+
+
+def quoted(line: str) -> str:
+    """How a line is quoted that people gave, who may give one of any length."""
+    return repr(line) if len(line) <= 60 else f"{line[:57]!r}…"
 
 
 def short(digits: str) -> str:

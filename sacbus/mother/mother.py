@@ -13,6 +13,7 @@ from contextlib import asynccontextmanager
 from typing import Final
 
 from sacbus.kernel import MS, SECOND, LineRate, Ns
+from sacbus.language.line import quoted, short
 from sacbus.links import open_line
 from sacbus.mother.caller import SLACK, Acknowledged, Caller, Clock, Sent
 from sacbus.mother.errors import BadRequest, MotherError
@@ -161,12 +162,14 @@ def addressed_line(text: str) -> tuple[int, str]:
     found = _ADDRESSED.fullmatch(text)
     if found is None:
         raise BadRequest(
-            f"line {text!r}: expected an address before the command, as in 85m3000a2d1 "
+            f"line {quoted(text)}: expected an address before the command, as in 85m3000a2d1 "
             "(0 for all nodes)"
         )
     node = int(found[1][:4])
     if node > 255:
-        raise BadRequest(f"node {found[1]}: expected an address from 4 to 255, or 0 for all nodes")
+        raise BadRequest(
+            f"node {short(found[1])}: expected an address from 4 to 255, or 0 for all nodes"
+        )
     return node, found[2]
 
 
@@ -174,12 +177,14 @@ def _call(callback: Callable[..., object], *arguments: object) -> None:
     callback(*arguments)
 
 
-def _bytes(line: str | bytes) -> bytes:
+def _bytes(line: object) -> bytes:
     if isinstance(line, bytes):
         return line
+    if not isinstance(line, str):
+        raise BadRequest(f"line {line!r}: expected str or bytes, got {type(line).__name__}")
     try:
         return line.encode("latin-1")
     except UnicodeEncodeError as fault:
         raise BadRequest(
-            f"line {line!r}: expected characters of one byte, got {line[fault.start]!r}"
+            f"line {quoted(line)}: expected characters of one byte, got {line[fault.start]!r}"
         ) from fault

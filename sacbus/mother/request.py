@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from sacbus.language.line import quoted
 from sacbus.mother.errors import BadRequest
 from sacbus.wire import ACK, ETX, MAX_BODY, NUL, STX, crc8
 
@@ -32,8 +33,8 @@ def safe_body(body: bytes) -> bytes:
     if (unsafe := _UNSAFE(body)) is not None:
         value = unsafe[0][0]
         raise BadRequest(
-            f"line {body.decode('latin-1')!r}: byte {value:02x} ({_UNSAFE_BYTES[value]}) would "
-            "end or break the packet; leave it out"
+            f"line {quoted(body.decode('latin-1'))}: byte {value:02x} ({_UNSAFE_BYTES[value]}) "
+            "would end or break the packet; leave it out"
         )
     sent = body
     if crc8(body) in _UNSAFE_CRCS and body:
@@ -42,14 +43,18 @@ def safe_body(body: bytes) -> bytes:
     if len(sent) > MAX_BODY:
         needs = " and a trailing space for its CRC" if len(sent) > len(body) else ""
         raise BadRequest(
-            f"line {body.decode('latin-1')!r}: expected at most {MAX_BODY} characters, got "
+            f"line {quoted(body.decode('latin-1'))}: expected at most {MAX_BODY} characters, got "
             f"{len(body)}{needs}; split it"
         )
     return sent
 
 
-def checked_address(node: int) -> int:
+def checked_address(node: object) -> int:
     """``node`` if a SAC can have it: 4 to 255 (0 is everybody, 1 mother, 2 and 3 STX and ETX)."""
+    if not isinstance(node, int):
+        raise BadRequest(
+            f"node {node!r}: expected a whole number from 4 to 255, got {type(node).__name__}"
+        )
     if not 4 <= node <= 255:
         raise BadRequest(
             f"node {node}: expected an address from 4 to 255"

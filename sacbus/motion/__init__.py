@@ -12,6 +12,7 @@ from sacbus.motion.motor import Entry, Slip, lost, slips
 from sacbus.motion.planner import plan
 from sacbus.motion.profile import Profile
 from sacbus.motion.timebase import FACTORY_XFREQ, Timebase
+from sacbus.motion.transition import transition_warnings
 
 __all__ = [
     "FACTORY_XFREQ",
@@ -32,4 +33,5 @@ __all__ = [
     "lost",
     "plan",
     "slips",
+    "transition_warnings",
 ]

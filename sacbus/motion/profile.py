@@ -7,6 +7,7 @@ counts as done at t, and a cut at t leaves it standing.
 Source: spec, "What an implementation must be able to answer".
 """
 
+from functools import lru_cache
 from typing import Final, Self
 
 import numpy as np
@@ -134,7 +135,12 @@ class Profile:
         """What the command asks of the hardware that it cannot give; found when asked for."""
         motion, drive = self.motion, self.drive
         asked = motion, drive, self.start_rpm, self.shares
-        found = () if harmless(*asked) else tuple(cautions(*asked, self.course))
+        if harmless(*asked):
+            found: tuple[Caution, ...] = ()
+        elif self._course is None:
+            found = _planned_cautions(*asked)
+        else:
+            found = tuple(cautions(*asked, self._course))
         if motion.rpm > COARSE_ABOVE_RPM and self.pulses != 0:
             found += tuple(of_velocity(motion, drive))
         return found
@@ -299,3 +305,12 @@ class Profile:
         if ticks < 0:
             raise ValueError(f"a command cannot be cut into before its first pulse, at {ticks}")
         return self.duration is not None and ticks >= self.duration
+
+
+@lru_cache(maxsize=1_024)
+def _planned_cautions(
+    motion: Motion, drive: Drive, start_rpm: Rpm, shares: Shares
+) -> tuple[Caution, ...]:
+    """What may not work of a profile as it was planned: of a loop's the same each time."""
+    course = Course(lay_out(motion, drive, start_rpm, shares))
+    return tuple(cautions(motion, drive, start_rpm, shares, course))

@@ -19,6 +19,7 @@ import click
 from sacbus.fresh import fresh_file
 from sacbus.language import Defaults
 from sacbus.motion import Drive
+from sacbus.picture_format import PictureError, picture_format
 from sacbus.plan.entries import Commands, ListFile, PlanError, QueueFile, Source, Spool
 from sacbus.plan.pulses import PulseFormat, format_of, write_pulses
 from sacbus.plan.report import json_pieces, text_lines
@@ -135,6 +136,10 @@ def _drawing(place: str | None) -> Callable[[Plan, Survey, BinaryIO], None] | No
     if place is None:
         return None
     try:
+        form = picture_format(Path(place))
+    except PictureError as fault:
+        raise PlanError(str(fault)) from fault
+    try:
         # matplotlib is an extra, and takes longer to import than most plans to make.
         from sacbus.plan import picture  # noqa: PLC0415
     except ImportError as fault:
@@ -142,7 +147,6 @@ def _drawing(place: str | None) -> Callable[[Plan, Survey, BinaryIO], None] | No
             f"drawing needs matplotlib ({fault}), --plot, "
             "install it: python -m pip install 'sacbus[plot]'"
         ) from fault
-    form = picture.picture_format(Path(place))
     return lambda plan, survey, file: picture.draw_plan(plan, survey, file, form)
 
 

@@ -112,14 +112,18 @@ class Spool:
 
 
 class ListFile:
-    """A list of commands, a line each, as the companion keeps its one-shots."""
+    """A list of commands, a line each, as the companion keeps its one-shots.
+
+    Blank lines, and those that begin with ``#``, which begins no command, are not commands.
+    """
 
     def __init__(self, spool: Spool) -> None:
         self._spool: Final = spool
 
     def __iter__(self) -> Iterator[Entry]:
         for number, line in enumerate(self._spool, start=1):
-            if text := line.strip():
+            text = line.strip()
+            if text and not text.startswith("#"):
                 where = f"{self._spool.name} line {number}"
                 yield Entry(text, where, skipped=line.index(text))
 

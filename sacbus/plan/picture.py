@@ -6,7 +6,6 @@ the same file, byte for byte. Importing this needs matplotlib, the extra ``plot`
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import BinaryIO, Final
 
 import numpy as np
@@ -18,20 +17,18 @@ from matplotlib.ticker import EngFormatter
 from sacbus.drawing import (
     GREY,
     LINE,
-    PictureError,
     house_style,
     save_figure,
     time_unit,
 )
 from sacbus.drawing import SHADES as SHADES_BY_NAME
-from sacbus.drawing import picture_format as format_of
 from sacbus.motion import Drive
 from sacbus.plan.curve import MOVING, Curve, Mark, curve_of
 from sacbus.plan.entries import PlanError
 from sacbus.plan.report import seconds
 from sacbus.plan.sequence import Plan, Survey
 
-__all__ = ["SHADES", "draw_plan", "house_style", "picture_format", "save_figure"]
+__all__ = ["SHADES", "draw_plan", "house_style", "save_figure"]
 
 MOST_COMMANDS: Final = 5_000
 """More than a picture has columns of pixels for."""
@@ -40,14 +37,6 @@ SHADES: Final = {state: SHADES_BY_NAME[state.value] for state in MOVING}
 
 CHARACTER: Final = 0.0072
 """Width of a character of a label, of the width of the plot."""
-
-
-def picture_format(path: Path) -> str:
-    """The format that a file's ending asks for; :class:`PlanError` for one that is not drawn."""
-    try:
-        return format_of(path)
-    except PictureError as fault:
-        raise PlanError(str(fault)) from fault
 
 
 def draw_plan(plan: Plan, survey: Survey, file: BinaryIO, form: str) -> None:

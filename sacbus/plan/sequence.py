@@ -26,7 +26,17 @@ from sacbus.language import (
     Velocity,
     parse,
 )
-from sacbus.motion import TICKS_PER_US, Drive, Profile, Rpm, gap_passes, load_ticks, plan
+from sacbus.language.line import quoted
+from sacbus.motion import (
+    TICKS_PER_US,
+    Drive,
+    Profile,
+    Rpm,
+    gap_passes,
+    load_ticks,
+    plan,
+    transition_warnings,
+)
 from sacbus.plan.entries import Commands, Entry, PlanError, Source
 
 __all__ = ["Plan", "Planned", "Survey", "plan_sequence"]
@@ -38,7 +48,8 @@ _SYNC: Final = "held for sync until that is released: planned as if that were at
 class Planned:
     """One command of a sequence. ``start`` in ticks from the sequence's first load.
 
-    ``remarks`` are about parts of the line that were not taken as they stood.
+    ``remarks`` are about parts of the line that were not taken as they stood, ``beginnings`` about
+    where it takes over from the command before.
     """
 
     line: str
@@ -46,6 +57,7 @@ class Planned:
     profile: Profile
     start: int
     remarks: tuple[Remark, ...]
+    beginnings: tuple[str, ...] = ()
 
     @property
     def end(self) -> int | None:
@@ -60,6 +72,7 @@ class Planned:
         return [
             *(str(remark) for remark in self.remarks),
             *held,
+            *self.beginnings,
             *(str(caution) for caution in self.profile.warnings),
         ]
 
@@ -194,7 +207,8 @@ def plan_sequence(
 class _Run:
     """One walk through a sequence: where it stands, and when the last command ended.
 
-    end: ticks; None after continuous motion, which never ends.
+    end: ticks; None after continuous motion, which never ends. What the last command's profile may
+    have warned of is in the standing, too: its last period tells how fast it really was.
     """
 
     def __init__(self, drive: Drive, standing: _Standing, *, gap: bool) -> None:
@@ -202,6 +216,7 @@ class _Run:
         self._gap = gap
         self.standing = standing
         self.end: int | None = 0
+        self._last: Profile | None = None
 
     def take(self, entry: Entry) -> Planned | None:
         """Go on by one entry; None if it only sets defaults."""
@@ -239,7 +254,7 @@ class _Run:
         """Plan a motion from where the last one ended."""
         if self.end is None:
             raise PlanError(
-                f"{entry.text!r} would never run, {entry.where}, the motion before it is "
+                f"{quoted(entry.text)} would never run, {entry.where}, the motion before it is "
                 "continuous: give that one steps"
             )
         before = self.standing
@@ -254,8 +269,10 @@ class _Run:
             if not seamless or motion.wait_us:
                 start += load
         profile = plan(motion, self._drive, kept)
-        planned = Planned(entry.text, motion, profile, start, remarks)
+        beginnings = () if self._last is None else transition_warnings(self._last, profile)
+        planned = Planned(entry.text, motion, profile, start, remarks, beginnings)
         self.end = planned.end
+        self._last = profile
         # Finding the last period lays the profile out; only a velocity that is kept needs it.
         last_period = profile.last_period if profile.kept_rpm else 0
         self.standing = _Standing(before.session, profile.kept_rpm, ramps, last_period)
@@ -264,7 +281,7 @@ class _Run:
 
 def _refusal(entry: Entry, command: object, remarks: tuple[Remark, ...]) -> str:
     """Why a line is no part of a plan."""
-    line, where = f"{entry.text!r}", entry.where
+    line, where = quoted(entry.text), entry.where
     if isinstance(command, Forward):
         return (
             f"{line} begins with an address, {where}, leave that out: what a command does is the "

@@ -18,7 +18,8 @@ from typing import Final, assert_never
 from typing import Protocol as Contract
 
 from sacbus.kernel import MS, Ns
-from sacbus.node import Said, Snapshot
+from sacbus.node import Said
+from sacbus.panel import Panel
 from sacbus.scenario.bench import Bench
 from sacbus.scenario.expectations import (
     VELOCITY_SLACK,
@@ -76,9 +77,15 @@ def judge(expected: Expectation, bench: Bench, verdict: Verdict) -> Judge:
 
 
 class _Look(Contract):
-    """One look: None if all is as expected, or else what there is."""
+    """One look. It is taken often and told of once, so its words are made only then."""
 
-    def misses(self) -> str | None: ...
+    def fits(self) -> bool:
+        """Whether all is as expected."""
+        ...
+
+    def got(self) -> str:
+        """What there is instead."""
+        ...
 
     def next_at(self) -> Ns | None:
         """When something changes next at the latest, if that is known."""
@@ -122,12 +129,11 @@ class _Looks:
             return
         clock = self._bench.clock
         now = clock.now
-        got = self._look.misses()
-        over = now >= self._until
-        if (got is None) is not bool(self._lasting) or over:
+        fits = self._look.fits()
+        if fits is not bool(self._lasting) or now >= self._until:
             self._turn += 1
             self._bench.stirred.remove(self._stir)
-            self._verdict(got)
+            self._verdict(None if fits else self._look.got())
             return
         self._resting = self._look.rests()
         when = now + (REST if self._resting else self._bench.look)
@@ -141,54 +147,67 @@ class _Looks:
 class _NodeLook:
     def __init__(self, bench: Bench, expected: NodeIs) -> None:
         self._clock = bench.clock
-        self._panels = [(address, bench.panels[address]) for address in expected.nodes]
+        self._panels = {address: bench.panels[address] for address in expected.nodes}
+        self._late = self._panels[expected.nodes[0]]
         self._expected = expected
         velocity = expected.velocity
         if velocity is not None and velocity.low == velocity.high:
             velocity = Bounds(velocity.low - VELOCITY_SLACK, velocity.high + VELOCITY_SLACK)
         self._velocity = velocity
 
-    def misses(self) -> str | None:
-        expected = self._expected
+    def fits(self) -> bool:
         now = self._clock.now
-        found = []
-        for address, panel in self._panels:
-            node = panel.node
-            # The state alone costs a fraction of a snapshot.
-            if expected.state is not None and node.state(now) != expected.state:
-                found.append(self._got(address, node.snapshot(now)))
-                continue
-            if expected.position is None and self._velocity is None and not expected.pins:
-                continue
-            seen = node.snapshot(now)
-            fits = (
-                (expected.position is None or seen.position_steps in expected.position)
-                and (self._velocity is None or seen.rpm in self._velocity)
-                and all(panel.level(pin) == level for pin, level in expected.pins.items())
-            )
-            if not fits:
-                found.append(self._got(address, seen))
-        return "; ".join(found) or None
+        # Of many that are waited for it is mostly the same one that is late.
+        if not self._is_so(self._late, now):
+            return False
+        for panel in self._panels.values():
+            if not self._is_so(panel, now):
+                self._late = panel
+                return False
+        return True
+
+    def got(self) -> str:
+        now = self._clock.now
+        return "; ".join(
+            self._words(address, panel)
+            for address, panel in self._panels.items()
+            if not self._is_so(panel, now)
+        )
+
+    def _is_so(self, panel: Panel, now: Ns) -> bool:
+        expected = self._expected
+        node = panel.node
+        # The state alone costs a fraction of a snapshot.
+        if expected.state is not None and node.state(now) != expected.state:
+            return False
+        if expected.position is None and self._velocity is None and not expected.pins:
+            return True
+        seen = node.snapshot(now)
+        return (
+            (expected.position is None or seen.position_steps in expected.position)
+            and (self._velocity is None or seen.rpm in self._velocity)
+            and all(panel.level(pin) == level for pin, level in expected.pins.items())
+        )
 
     def next_at(self) -> Ns | None:
-        times = [panel.node.wake_at() for _, panel in self._panels]
+        times = [panel.node.wake_at() for panel in self._panels.values()]
         return min((one for one in times if one is not None), default=None)
 
     def rests(self) -> bool:
         now = self._clock.now
         return all(
             panel.node.wake_at() is None and panel.node.state(now) in _RESTS
-            for _, panel in self._panels
+            for panel in self._panels.values()
         )
 
-    def _got(self, address: int, seen: Snapshot) -> str:
+    def _words(self, address: int, panel: Panel) -> str:
         expected = self._expected
+        seen = panel.node.snapshot(self._clock.now)
         parts = []
         if expected.position is not None:
             parts.append(f"position {seen.position_steps:g}")
         if self._velocity is not None:
             parts.append(f"velocity {seen.rpm:g}")
-        panel = dict(self._panels)[address]
         parts += [f"{pin} {panel.level(pin)}" for pin in expected.pins]
         who = f"node {address}: " if len(self._panels) > 1 else ""
         return f"{who}{', '.join([*parts, f'state {seen.state}'])}"
@@ -199,12 +218,13 @@ class _CountLook:
         self._bench = bench
         self._expected = expected
 
-    def misses(self) -> str | None:
+    def fits(self) -> bool:
         counts = self._bench.counts(self._expected.nodes)
-        wanted = self._expected.counts
-        if all(counts[name] in bounds for name, bounds in wanted.items()):
-            return None
-        return count_words({name: counts[name] for name in wanted})
+        return all(counts[name] in bounds for name, bounds in self._expected.counts.items())
+
+    def got(self) -> str:
+        counts = self._bench.counts(self._expected.nodes)
+        return count_words({name: counts[name] for name in self._expected.counts})
 
     def next_at(self) -> Ns | None:
         return None
@@ -218,12 +238,15 @@ class _ShownLook:
         self._shown = bench.listen(expected.node)
         self._text = expected.text.encode("latin-1", "replace")
 
-    def misses(self) -> str | None:
+    def fits(self) -> bool:
         at = self._shown.find(self._text)
         if at < 0:
-            return repr(self._shown[-200:].decode("latin-1"))
+            return False
         del self._shown[: at + len(self._text)]
-        return None
+        return True
+
+    def got(self) -> str:
+        return repr(self._shown[-200:].decode("latin-1"))
 
     def next_at(self) -> Ns | None:
         return None

@@ -86,6 +86,7 @@ class VirtualBus:
         self.nodes: Mapping[int, VirtualNode] = {
             address: VirtualNode(self, address, panel) for address, panel in bench.panels.items()
         }
+        hosted.deeds.append(lambda *_: bench.stir())
         self._reports: deque[Report] = deque(maxlen=REPORTS)
         hosted.bus.report_watchers.append(self._reports.append)
 

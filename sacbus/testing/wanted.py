@@ -7,15 +7,15 @@ row. All else is the scenario's own reading and its own rules.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 from sacbus.config.mistake import ConfigError, Findings
 from sacbus.config.notation import ranges
-from sacbus.config.source import Source
+from sacbus.config.table import Table
 from sacbus.configuration import Configuration
 from sacbus.scenario.expectations import Expectation
+from sacbus.scenario.expecting import ExpectationReader
+from sacbus.scenario.keys import EXPECT
 from sacbus.scenario.rules import complaints
-from sacbus.scenario.steps import StepReader
 from sacbus.scenario.values import Scenario, Step
 
 __all__ = ["wanted"]
@@ -44,13 +44,11 @@ def wanted(
 def _read(keys: Mapping[str, object], bus: Configuration) -> Expectation:
     content = {name.rstrip("_"): _plain(name, value) for name, value in keys.items()}
     findings = Findings(HERE, {})
-    findings.names[("step", 0, "expect")] = "expect"
-    source = Source(HERE, Path(), {}, {})
-    read = StepReader(source, findings, (bus,)).read(("step",), [{"expect": content}], "step", {})
+    table = Table.read(findings, ("expect",), content, EXPECT)
+    expected = ExpectationReader(findings, (bus,)).read(table, "")
     _refuse(findings)
-    does = read[0].step.does
-    assert isinstance(does, Expectation)
-    return does
+    assert expected is not None, "what is none has been found"
+    return expected
 
 
 def _plain(name: str, value: object) -> object:

@@ -16,8 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from sacbus.drawing import GREY, LINE, SHADES, PictureError, house_style, save_figure, time_unit
+from sacbus.drawing import GREY, LINE, SHADES, house_style, save_figure, time_unit
 from sacbus.kernel import SECOND, Ns
+from sacbus.picture_format import PictureError
 from sacbus.trace.paths import Path, paths
 from sacbus.trace.reading import Recording
 from sacbus.trace.strips import MOST_NODES, Strips, Talk, curve, stretches, strips_of

@@ -220,13 +220,16 @@ class _Reader:
             when=stored["t"],
             bus=stored["bus"],
             start=start,
-            end=start + self._buses[stored["bus"]].rate.span(len(data)),
+            end=stored.get("end", start + self._buses[stored["bus"]].rate.span(len(data))),
             lane=stored["lane"],
             sender=stored["from"],
             data=data,
             arrived=data if arrived is None else bytes.fromhex(arrived),
             collided=stored.get("collided", False),
             ninth=None if ninth is None else bytes.fromhex(ninth),
+            faults=tuple(stored.get("faults", ())),
+            missed=tuple(stored.get("missed", ())),
+            heard={int(one): bytes.fromhex(what) for one, what in stored.get("heard", {}).items()},
         )
 
     def _shape(self, stored: Stored) -> None:

@@ -19,7 +19,7 @@ from itertools import count
 from types import TracebackType
 from typing import BinaryIO, Final, Self, TypeVar, assert_never
 
-from sacbus.bus.transmission import Transmission
+from sacbus.bus import FaultOn, Port, Transmission
 from sacbus.hosted import HostedBus
 from sacbus.kernel import SECOND, Ns
 from sacbus.node import Node, Report
@@ -82,11 +82,6 @@ class Recorder:
     def mark(self, text: str, *, bus: int = 0, **details: object) -> None:
         """A remark, now; ``details`` are as JSON has them."""
         self._add(bus, {"is": "mark", "text": text, **({"details": details} if details else {})})
-
-    def fault_set(self, name: str, *, on: bool, bus: int = 0, **details: object) -> None:
-        """A fault of the line begins or ends."""
-        extra = {"details": details} if details else {}
-        self._add(bus, {"is": "fault", "name": name, "on": on, **extra})
 
     def outcome(self, node: int, body: bytes, result: str, attempts: int, *, bus: int = 0) -> None:
         """What became of a request of mother's."""
@@ -193,12 +188,14 @@ class _Place:
         self._seed = hosted.bus.medium.seed
         #: Senders by their identity, as they are named: a node by its address, in JSON.
         self._names: dict[int, str] = {}
-        #: Ports that were heard, which must live as long as their identity names them.
-        self._ports: list[object] = []
+        #: Those that are no nodes, which must live as long as their identity names them.
+        self._talkers: list[object] = []
+        self._links = 0
         now = hosted.now()
         bus = hosted.bus
         self._stop = [
             _watch(bus.medium.watchers, self._sent),
+            _watch(bus.medium.fault_watchers, self._faulty),
             _watch(bus.report_watchers, self._told),
             _watch(hosted.deeds, self._done),
         ]
@@ -228,23 +225,50 @@ class _Place:
             f'"data":"{data.hex()}"'
         )
         if sent.hits is not None or sent.passage is not None:
-            arrived = sent.outcome(self._seed)
-            if arrived != data:
-                text += f',"arrived":"{arrived.hex()}"'
-            if sent.collided:
-                text += ',"collided":true'
+            text += self._damage(sent)
         if sent.ninth is not None:
             text += f',"ninth":"{sent.ninth.hex()}"'
         self.add(text)
 
+    def _damage(self, sent: Transmission) -> str:
+        """What became of one that another overlapped, or faults touched, as far as it differs."""
+        found: dict[str, object] = {}
+        arrived = sent.outcome(self._seed)
+        if arrived != sent.data:
+            found["arrived"] = arrived.hex()
+        if sent.end != sent.start + sent.rate.span(len(sent.data)):
+            found["end"] = sent.end
+        if sent.hits is not None:
+            found["collided"] = True
+        passage = sent.passage
+        if passage is not None:
+            found["faults"] = passage.by
+            if passage.missed:
+                found["missed"] = ["links" if one is None else one for one in passage.missed]
+            if passage.receivers:
+                found["heard"] = {
+                    str(one): passage.heard_by(one, self._seed).hex() for one in passage.receivers
+                }
+        return f",{_text(found)[1:-1]}" if found else ""
+
     def _name(self, sender: object) -> str:
         """How a talker that is no node is called: paths differ from run to run."""
-        self._ports.append(sender)
-        called = getattr(sender, "name", "")
-        others = sum(name.startswith('"link') for name in self._names.values())
-        name = '"mother"' if called == "mother" else f'"link {others + 1}"'
+        self._talkers.append(sender)
+        if isinstance(sender, FaultOn):
+            name = json.dumps(sender.name)
+        elif isinstance(sender, Port) and sender.name == "mother":
+            name = '"mother"'
+        else:
+            self._links += 1
+            name = f'"link {self._links}"'
         self._names[id(sender)] = name
         return name
+
+    def _faulty(self, on: FaultOn) -> None:
+        """A fault was put on, or taken off: then it tells how often it acted."""
+        details: dict[str, object] = {"fault": repr(on.fault)} if on.is_on else {"count": on.count}
+        record = {"is": "fault", "name": on.name, "on": on.is_on, "details": details}
+        self.add(_text(record)[1:-1])
 
     def _told(self, report: Report) -> None:
         record: dict[str, object] = {

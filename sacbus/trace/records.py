@@ -63,8 +63,11 @@ class Sent:
     """A transmission, recorded when it was over.
 
     ``sender`` is a node's address, else the talker in words: ``mother``, ``link 1`` (in the order
-    in which they were first heard). ``arrived`` differs from ``data`` where it was damaged.
-    ``ninth``: a 0 or 1 for each byte where the line has ninth bits.
+    in which they were first heard), or a fault's name. ``arrived`` differs from ``data`` where it
+    was damaged. ``ninth``: a 0 or 1 for each byte where the line has ninth bits, as it was sent.
+    ``faults``: the names of those that acted on it; ``missed``: who was kept from hearing it, by
+    address (``links``: all that are no nodes); ``heard``: what arrived at those who are set to
+    another rate.
     """
 
     when: Ns
@@ -77,6 +80,9 @@ class Sent:
     arrived: bytes
     collided: bool = False
     ninth: bytes | None = None
+    faults: tuple[str, ...] = ()
+    missed: tuple[int | str, ...] = ()
+    heard: Mapping[int, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

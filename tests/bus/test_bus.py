@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nodes.sac import KIND, SacNode, SacProtocol, SacSettings
-from sacbus.bus import LATENCY, Bus, Port, Transmission
+from sacbus.bus import LATENCY, Bus, NoSuchNode, Port, Transmission
 from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from sacbus.node import Report, ReportKind
 from sacbus.wire import GENERAL_CALL, MOTHER, ack
@@ -38,8 +38,19 @@ def test_nodes_are_listed_in_the_order_in_which_they_were_added() -> None:
 def test_a_node_is_found_by_its_address_and_one_that_is_not_there_is_named() -> None:
     bus = Bench(10, 11).bus
     assert bus.node(11).address == 11
-    with pytest.raises(KeyError, match="no node 12 on bus"):
+    with pytest.raises(NoSuchNode) as nobody:
         bus.node(12)
+    assert str(nobody.value) == "no node 12 on bus, expected one of its own: 10, 11"
+    assert (nobody.value.address, nobody.value.bus, nobody.value.present) == (12, "bus", (10, 11))
+    assert isinstance(nobody.value, KeyError)
+
+
+def test_of_many_nodes_some_are_named_to_who_asks_for_a_wrong_one() -> None:
+    assert str(NoSuchNode("10", "bus", range(10, 30))) == (
+        "no node '10' on bus, expected one of its own: "
+        "10, 11, 12, 13, 14, 15, 16, 17, 18, 19 and 10 more"
+    )
+    assert str(NoSuchNode(10, "bus", ())) == "no node 10 on bus, expected one of its own: no nodes"
 
 
 def test_two_nodes_of_one_address_both_answer_and_spoil_each_others_answer() -> None:

@@ -337,3 +337,15 @@ def test_a_link_that_cannot_be_had_is_told_in_one_line(link: str, what: str) -> 
         asyncio.run(scene())
     assert link in str(told.value)
     assert "\n" not in str(told.value)
+
+
+def test_who_is_asked_for_something_else_than_a_node_and_a_line_says_what_it_wants() -> None:
+    async def play(_bus: HostedBus, mother: Mother) -> None:
+        with pytest.raises(BadRequest, match=r"^node '10': expected a whole number .*, got str$"):
+            await mother.send("10", "m1")  # type: ignore[arg-type]  # what people do
+        with pytest.raises(BadRequest, match=r"^line 400: expected str or bytes, got int$"):
+            await mother.send(10, 400)  # type: ignore[arg-type]  # as above
+        with pytest.raises(BadRequest, match=r"^line None: expected str or bytes"):
+            await mother.broadcast(None)  # type: ignore[arg-type]  # as above
+
+    virtually(play)

@@ -145,3 +145,11 @@ def test_whatever_is_asked_is_sent_safely_or_refused(line: bytes) -> None:
     assume(sent)
     assert len(sent) <= 46
     assert crc8(sent) not in (0, 2, 3)
+
+
+@pytest.mark.parametrize("line", [b"m" * 3_000, b"m" * 3_000 + b"\x03"])
+def test_a_line_that_is_refused_is_quoted_but_not_at_any_length(line: bytes) -> None:
+    with pytest.raises(BadRequest) as refused:
+        safe_body(line)
+    assert str(refused.value).startswith(f"line '{'m' * 57}'…: ")
+    assert len(str(refused.value)) < 200

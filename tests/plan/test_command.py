@@ -177,6 +177,9 @@ def test_without_matplotlib_one_line_says_what_to_install(
     capsys: Captured, monkeypatch: pytest.MonkeyPatch, directory: Path
 ) -> None:
     without_matplotlib(monkeypatch)
+    # Of a name that is wrong anyway that is told, which costs no installation.
+    assert run(["plan", "m200", "--plot", "one.xyz"]) == 2
+    assert "pictures are drawn as PNG or SVG, one.xyz" in capsys.readouterr().err
     assert run(["plan", "m200", "--plot", "one.png"]) == 2
     written = capsys.readouterr()
     assert written.out == ""
@@ -254,7 +257,7 @@ def test_the_page_on_planning_shows_what_is_printed(capsys: Captured, directory:
     (directory / "queue.csv").write_text(row * 6 + "7,200,0,1,100,fast,0,1,1,0,0,0\n")
     page = (DATA.parents[1] / "docs" / "planning.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```console\n\$ sacbus (.*)\n((?:[^`$].*\n)+)```", page)
-    assert len(blocks) == 3
+    assert len(blocks) == 4
     for arguments, expected in blocks:
         run(arguments.split())
         written = capsys.readouterr()

@@ -42,6 +42,11 @@ def test_a_list_passes_over_empty_lines_and_blanks_around_commands() -> None:
     ]
 
 
+def test_a_list_passes_over_comments() -> None:
+    with spool(b"# warm up\nm1\n  #m2\n#\nm3\n") as kept:
+        assert read(ListFile(kept)) == [("list.txt line 2", "m1"), ("list.txt line 5", "m3")]
+
+
 def test_the_companions_list_is_read_whole() -> None:
     with (DATA / "companion-one-shot.txt").open("rb") as file, Spool(file, "one-shot") as kept:
         entries = list(ListFile(kept))

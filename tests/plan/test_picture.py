@@ -12,7 +12,7 @@ import pytest
 from sacbus.language import Defaults
 from sacbus.motion import Drive
 from sacbus.plan import Commands, Plan, PlanError, QueueFile, Spool
-from sacbus.plan.picture import MOST_COMMANDS, SHADES, draw_plan, picture_format
+from sacbus.plan.picture import MOST_COMMANDS, SHADES, draw_plan
 from tests.drawing import load_fonts
 
 pytestmark = pytest.mark.slow
@@ -107,11 +107,3 @@ def test_a_command_of_one_pulse_can_be_drawn_and_a_very_long_one() -> None:
 def test_more_commands_than_can_be_seen_are_refused() -> None:
     with pytest.raises(PlanError, match="5001 commands are too many for a picture"):
         drawn("m1", loops=MOST_COMMANDS + 1)
-
-
-def test_the_ending_tells_the_format() -> None:
-    assert picture_format(Path("a.png")) == "png"
-    assert picture_format(Path("a.SVG")) == "svg"
-    for name in ("a", "a.pdf", "png"):
-        with pytest.raises(PlanError, match=r"ends in \.png or \.svg"):
-            picture_format(Path(name))

@@ -181,6 +181,35 @@ def test_what_a_line_lost_is_warned_of_with_its_column() -> None:
     assert planned.remarks[0].column == 7
 
 
+@pytest.mark.parametrize(
+    ("lines", "warnings"),
+    [
+        (
+            ["m200l1a1v300d999", "m200"],
+            ["goes on from 300 RPM, though the motor was only at 33.81"],
+        ),
+        (["m300v200d999", "m-300v100d1"], ["turns at once from 200 RPM: nothing slows it down"]),
+        # The velocity is lost in the gap: from rest.
+        (["m300v200d999", "m-300v100t9000d1"], []),
+        (["m300v200d1", "m-300v100"], []),
+        (["m300v200d999", "m300v100d1"], []),
+    ],
+)
+def test_what_the_motor_meets_between_two_commands_is_warned_of_at_the_second(
+    lines: list[str], warnings: list[str]
+) -> None:
+    first, second = plan_sequence(lines, DRIVE)
+    assert list(second.beginnings) == warnings
+    assert second.warnings == warnings
+    assert first.beginnings == ()
+
+
+def test_a_loop_that_turns_is_warned_of_where_it_begins_again() -> None:
+    looped = list(Plan(Commands(["m300v50d999", "m-300v50d999"]), DRIVE, loops=3))
+    turn = ["turns at once from 50 RPM: nothing slows it down"]
+    assert [one.warnings for one in looped] == [[], turn, turn, turn, turn, turn]
+
+
 def test_a_command_that_is_held_for_sync_says_so() -> None:
     (planned,) = plan_sequence(["m200s"], DRIVE)
     assert planned.warnings == [
@@ -281,6 +310,7 @@ def test_the_survey_says_what_walking_every_loop_shows(
         for told, untold in zip(last_told, every[loop * once : (loop + 1) * once], strict=True):
             assert untold.start == told.start + later
             assert untold.profile.duration == told.profile.duration
+            assert untold.warnings == told.warnings
 
 
 def test_a_plan_that_never_ends_has_no_duration_and_cannot_be_looped() -> None:

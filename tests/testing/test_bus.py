@@ -127,6 +127,18 @@ async def test_other_tasks_go_on_while_one_waits(bus: VirtualBus, mother: Mother
     assert len(ticks) == bus.now // (100 * MS)
 
 
+@pytest.mark.asyncio
+async def test_what_another_task_does_is_seen_at_once(bus: VirtualBus) -> None:
+    async def press() -> None:
+        await asyncio.sleep(0.123_456_7)
+        bus.node(10).power(on=False)
+
+    pressing = asyncio.create_task(press())
+    await bus.expected(node=10, state="OFF", within="10 s")
+    assert abs(bus.now - 123_456_700) <= 1
+    await pressing
+
+
 # ---- looking and doing ----
 
 
@@ -247,8 +259,8 @@ def test_packets_and_silence_can_be_expected(bus: VirtualBus) -> None:
     ("keys", "why"),
     [
         ({"node": 99, "position": 1}, "expect: expected nodes of bus 'bus' (10-12), got 99"),
-        ({"node": 10, "position": 1, "posture": 1}, "expect: posture: unknown key"),
-        ({"node": 10, "position": 1, "within": 3}, "expect: within: expected a time such as"),
+        ({"node": 10, "position": 1, "posture": 1}, "expect.posture: unknown key"),
+        ({"node": 10, "position": 1, "within": 3}, "expect.within: expected a time such as"),
         ({"node": 10}, "expected something to look at"),
         ({}, "expected something to look at"),
     ],

@@ -51,6 +51,15 @@ def test_flush_waits_until_all_is_on_the_line_and_over(bus: VirtualBus) -> None:
     assert 0.1 <= bus.time() < 0.103
 
 
+def test_flush_waits_for_a_line_that_is_taken(bus: VirtualBus) -> None:
+    port = bus.serial()
+    bus.raw(b"\x55" * 384)
+    bus.run_for("10 ms")
+    port.write(b"\x55" * 384)
+    port.flush()
+    assert 0.2 <= bus.time() < 0.206
+
+
 def test_a_wrong_baud_rate_is_garbage(bus: VirtualBus) -> None:
     port = bus.serial(baud=9_600, timeout=0.5)
     port.write(M400)

@@ -12,8 +12,9 @@ import pytest
 
 from sacbus.bus import BitErrors
 from sacbus.daemon import Configuration, HostedBus
-from sacbus.drawing import SHADES, PictureError
+from sacbus.drawing import SHADES
 from sacbus.mother import Mother, MotherError
+from sacbus.picture_format import PictureError
 from sacbus.trace import Recorder, Recording
 from sacbus.trace.plots import HIT, MOST_TALKERS, draw_axes, draw_path
 from tests.drawing import load_fonts

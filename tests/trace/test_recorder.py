@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import errno
 import json
 from io import BytesIO
@@ -10,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from sacbus.bus import Drop
+from sacbus.bus import BitErrors, Dead, NoiseBursts, WrongBaud
 from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.host import run_virtual
 from sacbus.kernel import SECOND, Kernel
-from sacbus.mother import Mother, NoAnswer
-from sacbus.trace import Recorder, read
-from sacbus.trace.records import Driven, Ended, Mark, Moved, Sent, Switched, Told, Turned
-from sacbus.wire import encode
+from sacbus.mother import Mother, MotherError
+from sacbus.trace import Recorder, Recording, read
+from sacbus.trace.difference import differences
+from sacbus.trace.records import Driven, Ended, FaultSet, Mark, Moved, Sent, Switched, Told, Turned
 from tests.trace.rig import recorded, two_axes
 
 
@@ -65,18 +66,6 @@ def test_what_a_node_reports_and_a_turned_encoder_are_in_it() -> None:
     assert (turned.node, turned.detents) == (11, -2)
 
 
-def test_what_a_fault_did_is_told_as_sent_and_as_arrived() -> None:
-    async def play(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
-        bus.fault(Drop(1.0))
-        with pytest.raises(NoAnswer):
-            await mother.send(10, "V10")
-
-    sent = [one for one in recorded(play) if isinstance(one, Sent)]
-    assert sent
-    assert all((one.data, one.arrived) == (encode(10, 1, b"V10"), b"") for one in sent)
-    assert not any(one.collided for one in sent)
-
-
 def test_what_two_talkers_spoil_is_told_as_sent_and_as_arrived() -> None:
     async def play(bus: HostedBus, _mother: Mother, _recorder: Recorder) -> None:
         one, other = object(), object()
@@ -92,6 +81,64 @@ def test_what_two_talkers_spoil_is_told_as_sent_and_as_arrived() -> None:
     ]
     assert all(one.collided and one.arrived != one.data for one in sent)
     assert sent[0].arrived[:1] == b"\x02"
+
+
+def damaged(seed: int) -> tuple[bytes, Recording]:
+    async def play(bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+        faults = [bus.fault(one) for one in (BitErrors(0.003), NoiseBursts(20, 2))]
+        for number in range(40):
+            with contextlib.suppress(MotherError):
+                await mother.send(10, f"m{number + 1}v100")
+        for fault in faults:
+            fault.off()
+
+    sink = BytesIO()
+    recording = recorded(play, Configuration(nodes=(10, 11), seed=seed), sink)
+    return sink.getvalue(), recording
+
+
+def test_the_same_seed_of_faults_leaves_the_same_bytes_and_another_others() -> None:
+    one, again, other = damaged(1), damaged(1), damaged(2)
+    assert one[0] == again[0]
+    assert one[0] != other[0]
+    assert list(differences(one[1], other[1]))
+
+
+def test_faults_and_what_they_did_are_in_it() -> None:
+    records = list(damaged(1)[1])
+    faults = [one for one in records if isinstance(one, FaultSet)]
+    assert [(one.name, one.on) for one in faults] == [
+        ("bit_errors", True),
+        ("noise_bursts", True),
+        ("bit_errors", False),
+        ("noise_bursts", False),
+    ]
+    assert faults[0].details == {"fault": "BitErrors(rate=0.003)"}
+    sent = [one for one in records if isinstance(one, Sent)]
+    flipped = sum(
+        (before ^ after).bit_count()
+        for one in sent
+        if one.faults == ("bit_errors",) and not one.collided
+        for before, after in zip(one.data, one.arrived, strict=True)
+    )
+    count = faults[2].details["count"]
+    assert isinstance(count, int)
+    assert 0 < flipped <= count
+    assert "noise_bursts" in {one.sender for one in sent}
+
+
+def test_who_was_kept_from_hearing_is_told() -> None:
+    async def play(bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+        bus.fault(Dead(11))
+        bus.fault(WrongBaud(10, 19_200))
+        for node in (10, 11):
+            with contextlib.suppress(MotherError):
+                await mother.send(node, "m100")
+
+    first, *_, last = [one for one in recorded(play) if isinstance(one, Sent)]
+    assert first.heard.keys() == {10}
+    assert first.heard[10] != first.data == first.arrived
+    assert last.missed
 
 
 def test_several_buses_go_into_one_recording() -> None:

@@ -565,3 +565,37 @@ def test_a_loop_warns_of_its_commands_once() -> None:
     warned = [report.line for report in line.bench.told(ReportKind.WARNING)]
     assert warned.count("m19v300a1d1") == 2
     assert warned.count("m-20v300a1d1") == 2
+
+
+# ---- jumps of velocity --------------------------------------------------------------------------
+
+
+def warned(line: Line) -> list[tuple[str, str]]:
+    return [(report.line, report.text) for report in line.bench.told(ReportKind.WARNING)]
+
+
+def test_a_turn_at_speed_is_warned_of() -> None:
+    line = Line()
+    line.says("m300v200a1d999", "m-300v100d1")
+    line.run()
+    text = "turns at once from 200 RPM: nothing slows it down"
+    assert warned(line) == [("m-300v100a1d1", text)]
+
+
+def test_a_jump_to_a_velocity_that_was_never_reached_is_warned_of() -> None:
+    line = Line()
+    line.says("m100v300a1d999", "m200")
+    line.run()
+    assert warned(line)[1:] == [
+        ("m200v300a1d999", "goes on from 300 RPM, though the motor was only at 109.01")
+    ]
+
+
+def test_what_begins_from_rest_is_not_warned_of_what_was_before() -> None:
+    line = Line()
+    line.says("m300v200a1d999")
+    line.run()
+    line.until(line.at + SECOND)
+    line.says("m-300v100d1")
+    line.run()
+    assert warned(line) == []
