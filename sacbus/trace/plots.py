@@ -131,7 +131,7 @@ def _axes(recording: Recording, strips: Strips, flags: Sequence[Ns]) -> Figure:
             *(Patch(facecolor=shade, label=state) for state, shade in SHADES.items()),
         ]
     if any(talk.hit.starts for talk in talkers.values()):
-        handles.append(Patch(facecolor=HIT, label="collided or damaged"))
+        handles.append(Patch(facecolor=HIT, label="collided, damaged or missed"))
     if flags:
         handles.append(Line2D([], [], color=HIT, linestyle=":", label="not as expected"))
     if handles:

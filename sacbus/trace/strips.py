@@ -70,7 +70,7 @@ class Ticks:
 
 @dataclass(slots=True)
 class Talk:
-    """What one talker sent: all of it, and what collided or arrived damaged."""
+    """What one talker sent: all of it, and what did not arrive as it was sent, at whomever."""
 
     whole: Ticks = field(default_factory=Ticks)
     hit: Ticks = field(default_factory=Ticks)
@@ -108,7 +108,7 @@ def strips_of(
         if type(record) is Sent and record.start >= since:
             talk = talks.setdefault((record.bus, record.sender), Talk())
             talk.whole.add(record)
-            if record.collided or record.arrived != record.data:
+            if record.collided or record.arrived != record.data or record.missed or record.heard:
                 talk.hit.add(record)
         elif type(record) is Moved:
             node = record.bus, record.node

@@ -10,10 +10,10 @@ from xml.etree import ElementTree as ET
 import matplotlib as mpl
 import pytest
 
-from sacbus.bus import BitErrors
+from sacbus.bus import BitErrors, Dead
 from sacbus.daemon import Configuration, HostedBus
 from sacbus.drawing import SHADES
-from sacbus.mother import Mother, MotherError
+from sacbus.mother import Mother, MotherError, NoAnswer
 from sacbus.picture_format import PictureError
 from sacbus.trace import Recorder, Recording
 from sacbus.trace.plots import HIT, MOST_TALKERS, draw_axes, draw_path
@@ -51,7 +51,7 @@ def test_each_node_that_moved_and_who_talked_is_named(axes: Recording) -> None:
     )
     assert {"velocity", "position", *SHADES} <= set(said)
     assert any(one.startswith("2 nodes, 2 moved, ") for one in said)
-    assert "collided or damaged" not in said
+    assert "collided, damaged or missed" not in said
 
 
 def test_the_states_are_shaded(axes: Recording) -> None:
@@ -81,9 +81,19 @@ async def _damaged(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
 
 def test_what_arrived_damaged_is_told_apart() -> None:
     picture = drawn(recorded(_damaged))
-    assert "collided or damaged" in words(picture)
+    assert "collided, damaged or missed" in words(picture)
     assert picture.decode().count(HIT) > 1
     assert any(one.startswith("2 nodes, none moved") for one in words(picture))
+
+
+async def _dead(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
+    bus.fault(Dead(10))
+    with pytest.raises(NoAnswer):
+        await mother.send(10, "V10")
+
+
+def test_what_one_node_did_not_hear_is_told_apart_as_well() -> None:
+    assert "collided, damaged or missed" in words(drawn(recorded(_dead)))
 
 
 async def _nothing(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
