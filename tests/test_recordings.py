@@ -15,6 +15,7 @@ from sacbus.mother import safe_body
 from sacbus.trace import read
 from sacbus.trace.records import Moved, Sent
 from sacbus.wire import encode
+from tests.drawing import load_fonts, without_matplotlib
 from tests.serving import client, served, until
 from tests.trace.rig import Dump, recorded, two_axes
 
@@ -124,7 +125,7 @@ def test_diff_of_others_tells_the_first_and_is_status_1(
         (["diff", "{queue}", "{run}"], "{queue}, line 1: expected a recording of sacbus, got "),
         (["diff", "{run}", "{broken}"], "{broken}, line 2: expected a record, got 'x'"),
         (["diff", "{run}", "{run}", "--time", "1 year"], "expected a time such as 1us, 10ms or"),
-        (["export", "{run}"], "nothing to write: give --vcd, --csv or --positions a file"),
+        (["export", "{run}"], "nothing to write: give --vcd, --csv, --positions, --pcap or "),
         (["export", "{run}", "--csv", "x", "--every", "0"], "expected a time above 0, got '0'"),
         (["export", "{broken}", "--csv", "{out}"], "{broken}, line 2: expected a record, got 'x'"),
     ],
@@ -141,3 +142,58 @@ def test_what_is_wrong_is_one_line_and_status_2(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith("error: ")
     assert text.format(**names) in line
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", ["png", "svg"])
+def test_a_recording_is_drawn(
+    recording: Path, tmp_path: Path, capsys: Captured, ending: str
+) -> None:
+    load_fonts()
+    axes, path = tmp_path / f"axes.{ending}", tmp_path / f"path.{ending}"
+    assert run(["export", str(recording), "--plot", str(axes)]) == 0
+    assert run(["export", str(recording), "--plot", str(path), "--xy", "10,11"]) == 0
+    assert capsys.readouterr().out == f"{axes}: drawn\n{path}: drawn\n"
+    head = b"\x89PNG" if ending == "png" else b"<?xml"
+    assert axes.read_bytes().startswith(head)
+    assert path.read_bytes().startswith(head)
+    assert axes.read_bytes() != path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--plot", "x.pdf"], "pictures are drawn as PNG or SVG, x.pdf, give a name that ends in"),
+        (["--plot", "x.png", "--xy", "10"], "expected two nodes such as 10,11, got '10'"),
+        (["--plot", "x.png", "--xy", "10,10"], "expected two nodes such as 10,11, got '10,10'"),
+        (["--plot", "x.png", "--xy", "10,12"], "expected nodes 10 and 12 on one bus of it, got"),
+        (["--csv", "x.csv", "--xy", "10,11"], "--xy: expected only with --plot"),
+        (["--csv", "x.csv", "--nodes", "10"], "--nodes: expected only with --plot"),
+        (["--plot", "x.png", "--nodes", "10", "--xy", "10,11"], "--nodes or --xy, got both"),
+        (["--plot", "x.png", "--nodes", "10-12"], "expected nodes that are in it, got 12"),
+    ],
+)
+def test_what_cannot_be_drawn_is_one_line(
+    recording: Path,
+    tmp_path: Path,
+    capsys: Captured,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    told: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["export", str(recording), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert told in err
+    assert list(tmp_path.iterdir()) == [recording]
+
+
+def test_without_matplotlib_one_line_says_what_to_install(
+    recording: Path, tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_matplotlib(monkeypatch)
+    assert run(["export", str(recording), "--plot", str(tmp_path / "x.png")]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.endswith("install it: python -m pip install 'sacbus[plot]'\n")

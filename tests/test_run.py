@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 import signal
 import subprocess
 import sys
+from html import unescape
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -13,6 +16,7 @@ import pytest
 
 from sacbus.cli import run
 from sacbus.trace import read
+from tests.drawing import load_fonts, without_matplotlib
 from tests.serving import PATIENCE, served, started
 
 Captured = pytest.CaptureFixture[str]
@@ -190,6 +194,61 @@ def test_a_page_that_cannot_be_written_is_one_line(file: Path, capsys: Captured)
 
 
 @pytest.mark.slow
+def test_a_picture_is_drawn(file: Path, tmp_path: Path) -> None:
+    load_fonts()
+    path = tmp_path / "a.svg"
+    assert run(["run", str(file), "--plot", str(path)]) == 0
+    assert b"1 node, 1 moved, 0.682769 s" in path.read_bytes()
+
+
+def test_a_picture_that_is_not_drawn_is_told_before_anything_is_played(
+    file: Path, capsys: Captured
+) -> None:
+    assert run(["run", str(file), "--plot", "a.pdf"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("error: pictures are drawn as PNG or SVG, a.pdf, ")
+
+
+@pytest.mark.slow
+def test_a_page_has_all_cases_with_pictures_and_how_to_repeat_each(
+    file: Path, tmp_path: Path
+) -> None:
+    load_fonts()
+    path = tmp_path / "r.html"
+    arguments = ["--set", "steps=[40,41]", "--seed", "3", "--report", str(path)]
+    assert run(["run", str(file), *arguments]) == 1
+    text = path.read_text("utf-8")
+    assert "<h1>1 of 2 cases passed</h1>" in text
+    assert text.count("<svg") == 2
+    assert text.count("not as expected</text>") == 1
+    for steps in (40, 41):
+        assert f"<pre>sacbus run {file} --set steps={steps} --seed 3</pre>" in text
+
+
+def test_a_page_without_matplotlib_has_no_pictures_and_says_why(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_matplotlib(monkeypatch)
+    path = tmp_path / "r.html"
+    assert run(["run", str(file), "--report", str(path)]) == 0
+    text = path.read_text("utf-8")
+    assert "<svg" not in text
+    assert "it takes matplotlib (python -m pip install &#x27;sacbus[plot]&#x27;)" in text
+
+
+def test_what_is_repeated_is_the_same_case(file: Path, tmp_path: Path) -> None:
+    file.write_text(PASSES.replace("steps = 40", 'steps = 40\nnote = "a b"'))
+    path = tmp_path / "r.html"
+    assert run(["run", str(file), "--set", "note=it's 1", "--report", str(path), "-k", "x"]) == 0
+    (line,) = re.findall("<pre>sacbus (.*?)</pre>", path.read_text("utf-8"))
+    words = shlex.split(unescape(line))
+    again = tmp_path / "again.html"
+    assert run([*words, "--report", str(again)]) == 0
+    assert again.read_bytes() == path.read_bytes()
+
+
+@pytest.mark.slow
 def test_standard_input_is_a_scenario_for_a_real_process() -> None:
     command = [sys.executable, "-m", "sacbus", "run", "-"]
     ran = subprocess.run(
@@ -202,12 +261,16 @@ def test_standard_input_is_a_scenario_for_a_real_process() -> None:
 @pytest.mark.slow
 def test_a_served_bus_is_played_on_over_its_pty(file: Path) -> None:
     file.write_text(PASSES.replace('node = 10, position = 40, state = "STANDBY"', "acks = 1"))
+    page = file.with_suffix(".html")
     with (
         served("--nodes", "10") as bus,
-        started("run", str(file), "--link", bus.link) as player,
+        started("run", str(file), "--link", bus.link, "--report", str(page)) as player,
     ):
         assert player.wait() == 0
     assert player.text.startswith("passed ")
+    text = page.read_text("utf-8")
+    assert "what happens behind a link is not recorded" in text
+    assert f"--link {bus.link}</pre>" in text
 
 
 @pytest.mark.slow

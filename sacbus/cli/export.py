@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from sacbus.cli.options import WrongInput, verbose
+from sacbus.cli.options import WrongInput, read_addresses, verbose
 from sacbus.cli.recordings import opened, picture_form, span
 from sacbus.fresh import fresh_file
 
@@ -29,6 +29,11 @@ def _pair(
     if found is None or found[1] == found[2]:
         raise click.BadParameter(f"expected two nodes such as 10,11, got {given!r}")
     return int(found[1]), int(found[2])
+
+
+def _several(ctx: click.Context, param: click.Parameter, given: str | None) -> tuple[int, ...]:
+    """Addresses; none where none are given."""
+    return () if given is None else read_addresses(ctx, param, given)
 
 
 @click.command("export")
@@ -66,6 +71,12 @@ def _pair(
     help="Velocity and position against time, and who talked when: .png or .svg.",
 )
 @click.option(
+    "--nodes",
+    callback=_several,
+    metavar="LIST",
+    help="With --plot: only these, 10-12,85. [default: the first 12 that moved]",
+)
+@click.option(
     "--xy",
     callback=_pair,
     metavar="X,Y",
@@ -87,6 +98,7 @@ def export_command(
     positions: Path | None,
     pcap: Path | None,
     picture: Path | None,
+    nodes: tuple[int, ...],
     xy: tuple[int, int] | None,
     every: int,
 ) -> int:
@@ -103,8 +115,10 @@ def export_command(
         raise click.UsageError(
             "nothing to write: give --vcd, --csv, --positions, --pcap or --plot a file"
         )
-    if xy is not None and picture is None:
-        raise click.UsageError("--xy: expected only with --plot")
+    if picture is None and (xy is not None or nodes):
+        raise click.UsageError(f"{'--nodes' if nodes else '--xy'}: expected only with --plot")
+    if xy is not None and nodes:
+        raise click.UsageError("expected --nodes or --xy, got both")
     if every == 0:
         raise click.BadParameter("expected a time above 0, got '0'", param_hint="--every")
     form = None if picture is None else picture_form(picture)
@@ -124,7 +138,7 @@ def export_command(
             written = write_pcapng(read, file)
         click.echo(f"{pcap}: {written} packets")
     if picture is not None and form is not None:
-        _draw(read, picture, form, xy)
+        _draw(read, picture, form, nodes, xy)
         click.echo(f"{picture}: drawn")
     if not read.whole:
         click.echo(
@@ -133,14 +147,20 @@ def export_command(
     return 0
 
 
-def _draw(recording: Recording, picture: Path, form: str, xy: tuple[int, int] | None) -> None:
+def _draw(
+    recording: Recording,
+    picture: Path,
+    form: str,
+    nodes: tuple[int, ...],
+    xy: tuple[int, int] | None,
+) -> None:
     from sacbus.picture_format import PictureError
     from sacbus.trace.plots import draw_axes, draw_path
 
     try:
         with fresh_file(picture) as file:
             if xy is None:
-                draw_axes(recording, file, form)
+                draw_axes(recording, file, form, nodes=nodes)
             else:
                 draw_path(recording, file, form, xy)
     except PictureError as fault:

@@ -31,6 +31,7 @@ table { border-collapse: collapse; max-width: 100%; font-size: .9rem; }
 th, td { text-align: left; vertical-align: top; padding: .25rem .8rem .25rem 0;
   border-bottom: 1px solid #e4e8ee; overflow-wrap: break-word; }
 td { min-width: 2.5rem; max-width: 30rem; }
+.line td { max-width: 50rem; }
 th { font-weight: 600; color: #56637a; }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 code, pre, .line td { font-family: ui-monospace, monospace; font-size: .85rem; }
@@ -167,18 +168,21 @@ def _packet(words: str) -> str:
 
 
 def _expectations(result: Result) -> Iterable[str]:
-    looked: list[Met | Failure] = [*result.failures, *result.met]
-    if not looked:
+    if not result.looked:
         return
     yield "<h3>Expectations</h3>"
-    left = len(looked) - MOST_ROWS
-    if left > 0:
-        # Those that failed have all been told above.
-        del looked[MOST_ROWS:]
-    looked.sort(key=lambda one: one.when)
-    yield _table(("", "#time, s", "expected", "got", "step", "where"), map(_looked, looked))
-    if left > 0:
-        yield f'<p class="note">… and {left} more.</p>'
+    # Of what was met the first, of what was not all.
+    room = MOST_ROWS - len(result.failures)
+    shown = []
+    for one in result.looked:
+        if isinstance(one, Met):
+            room -= 1
+            if room < 0:
+                continue
+        shown.append(one)
+    yield _table(("", "#time, s", "expected", "got", "step", "where"), map(_looked, shown))
+    if len(shown) < len(result.looked):
+        yield f'<p class="note">… and {len(result.looked) - len(shown)} more that were met.</p>'
 
 
 def _looked(one: Met | Failure) -> str:

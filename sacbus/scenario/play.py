@@ -187,7 +187,7 @@ class Play:
         elif expected:
             step = self._scenario.steps[index]
             when = self._clock.now - self._origin
-            self.result.met.append(Met(when, expected, step.name, step.place))
+            self.result.looked.append(Met(when, expected, step.name, step.place))
         self._open.discard(index)
         self._release(index, self._clock.now if at is None else at)
 
@@ -218,17 +218,17 @@ class Play:
     def _fail(self, index: int, expected: str, got: str) -> None:
         step = self._scenario.steps[index]
         bench = self._bench(getattr(step.does, "bus", ""))
-        self.result.failures.append(
-            Failure(
-                self._clock.now - self._origin,
-                expected,
-                got,
-                step.name,
-                step.place,
-                bench.line.words(self._origin),
-                self._states(bench, step.does),
-            )
+        failure = Failure(
+            self._clock.now - self._origin,
+            expected,
+            got,
+            step.name,
+            step.place,
+            bench.line.words(self._origin),
+            self._states(bench, step.does),
         )
+        self.result.failures.append(failure)
+        self.result.looked.append(failure)
 
     def _states(self, bench: Bench, deed: object) -> tuple[str, ...]:
         """The nodes that a step is about, as they are now; the last warnings if it counts them."""

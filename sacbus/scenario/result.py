@@ -71,7 +71,8 @@ class Result:
     ended: Ns = 0
     expectations: int = 0
     counts: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-    met: list[Met] = field(default_factory=list)
+    #: What was met, and the failures once more, in the order in which that was certain.
+    looked: list[Met | Failure] = field(default_factory=list)
     #: When it began, in the bus time of the recording.
     origin: Ns = 0
     #: What the nodes were like at its end, by bus and configured address; none behind a link.

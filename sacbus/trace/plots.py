@@ -49,13 +49,16 @@ def draw_axes(
     *,
     since: Ns | None = None,
     flags: Sequence[Ns] = (),
+    nodes: Sequence[int] = (),
 ) -> None:
     """Velocity and position of each node that moved, its states shaded; below who talked when.
 
-    At most :data:`MOST_NODES` nodes are drawn. ``since``: what is time 0, and where the picture
-    begins, or else with the first record. ``flags``: instants at which a line is drawn across.
+    At most :data:`MOST_NODES` are drawn; or ``nodes``, moved or not. ``since``: what is time 0, and
+    where the picture begins, or else with the first record. ``flags``: instants at which a line is
+    drawn across. :class:`PictureError` for nodes that are not in it, or too many.
     """
-    strips = strips_of(recording, since)
+    _look_for(recording, nodes)
+    strips = strips_of(recording, since, nodes)
     with house_style():
         save_figure(_axes(recording, strips, flags), file, form)
 
@@ -77,6 +80,21 @@ def draw_path(recording: Recording, file: BinaryIO, form: str, nodes: tuple[int,
 
 
 # ---- axes against time ----
+
+
+def _look_for(recording: Recording, nodes: Sequence[int]) -> None:
+    """:class:`PictureError` for nodes that are not there, or too many of them."""
+    there = {node.address for node in recording.nodes}
+    missing = [node for node in nodes if node not in there]
+    if missing:
+        raise PictureError(
+            f"{recording.name}: expected nodes that are in it, got {missing[0]}, name others"
+        )
+    if len(nodes) > MOST_NODES:
+        raise PictureError(
+            f"{recording.name}: expected {MOST_NODES} nodes at most in a picture, "
+            f"got {len(nodes)}, name fewer"
+        )
 
 
 def _axes(recording: Recording, strips: Strips, flags: Sequence[Ns]) -> Figure:
@@ -113,7 +131,7 @@ def _axes(recording: Recording, strips: Strips, flags: Sequence[Ns]) -> Figure:
             *(Patch(facecolor=shade, label=state) for state, shade in SHADES.items()),
         ]
     if any(talk.hit.starts for talk in talkers.values()):
-        handles.append(Patch(facecolor=HIT, label="collided or damaged"))
+        handles.append(Patch(facecolor=HIT, label="collided, damaged or missed"))
     if flags:
         handles.append(Line2D([], [], color=HIT, linestyle=":", label="not as expected"))
     if handles:
@@ -193,7 +211,8 @@ def _name(recording: Recording, bus: int, who: int | str) -> str:
 
 def _title(recording: Recording, strips: Strips, whole: float) -> str:
     nodes = len(recording.nodes)
-    some = f", the first {MOST_NODES} drawn" if strips.moved > MOST_NODES else ""
+    drawn = len(strips.tracks)
+    some = f", {drawn} drawn" if strips.moved != drawn else ""
     moved = f"{strips.moved} moved{some}" if strips.moved else "none moved"
     return f"{nodes} node{'s' if nodes != 1 else ''}, {moved}, {whole:.6f} s"
 

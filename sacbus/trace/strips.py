@@ -8,7 +8,7 @@ nodes only those that are drawn. Knows nothing of drawing. Times in ns of bus ti
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
@@ -70,7 +70,7 @@ class Ticks:
 
 @dataclass(slots=True)
 class Talk:
-    """What one talker sent: all of it, and what collided or arrived damaged."""
+    """What one talker sent: all of it, and what did not arrive as it was sent, at whomever."""
 
     whole: Ticks = field(default_factory=Ticks)
     hit: Ticks = field(default_factory=Ticks)
@@ -80,8 +80,8 @@ class Talk:
 class Strips:
     """A recording from ``first`` to ``last``: the nodes that moved, and who talked.
 
-    ``moved``: how many moved; of them the first ones are in ``tracks``. The talkers are called as
-    in the records, by bus.
+    ``moved``: how many moved; of them the first ones are in ``tracks``, or those wanted. The
+    talkers are called as in the records, by bus.
     """
 
     first: Ns
@@ -91,10 +91,15 @@ class Strips:
     talks: dict[tuple[int, int | str], Talk]
 
 
-def strips_of(recording: Recording, since: Ns | None = None) -> Strips:
-    """Go through a recording; ``since``: from when on it is drawn, or else its first record."""
+def strips_of(
+    recording: Recording, since: Ns | None = None, wanted: Collection[int] = ()
+) -> Strips:
+    """Go through a recording; ``since``: from when on it is drawn, or else its first record.
+
+    ``wanted``: addresses of the nodes that are drawn, whether they moved or not.
+    """
     resting = {(node.bus, node.address): Track(node) for node in recording.nodes}
-    tracks: dict[Node, Track] = {}
+    tracks = {node: track for node, track in resting.items() if node[1] in wanted}
     moved: set[Node] = set()
     talks: dict[tuple[int, int | str], Talk] = {}
     for record in recording:
@@ -103,20 +108,18 @@ def strips_of(recording: Recording, since: Ns | None = None) -> Strips:
         if type(record) is Sent and record.start >= since:
             talk = talks.setdefault((record.bus, record.sender), Talk())
             talk.whole.add(record)
-            if record.collided or record.arrived != record.data:
+            if record.collided or record.arrived != record.data or record.missed or record.heard:
                 talk.hit.add(record)
         elif type(record) is Moved:
             node = record.bus, record.node
-            if node in tracks:
-                tracks[node].segments.append(record.segment)
-                continue
             track = resting[node]
             track.segments.append(record.segment)
-            if _moves(track):
+            if node not in moved and _moves(track):
                 moved.add(node)
-                if len(tracks) < MOST_NODES:
+                if not wanted and len(tracks) < MOST_NODES:
                     tracks[node] = track
-            del track.segments[: -1 if node not in tracks else 0]
+            if node not in tracks:
+                del track.segments[:-1]
     first = since or 0
     last = max(recording.end, first + 1)
     return Strips(first, last, len(moved), dict(sorted(tracks.items())), dict(_in_order(talks)))
