@@ -160,7 +160,9 @@ def test_whenever_it_is_killed_every_file_holds_the_old_or_the_new(
                 unfinished += now != (begun, begun)
                 was[address] = now
     assert unfinished > KILLS // 10
-    assert min(was.values()) > (3_000 + KILLS, 0)
+    # In real time a thread saves: many a life is over before it does.
+    progress = KILLS if mode == "virtual" else KILLS // 4
+    assert min(was.values()) > (3_000 + progress, 0)
     # A killed one may leave a piece behind; the next start clears it away.
     state = StateDirectory(tmp_path, "bus")
     state.claim()

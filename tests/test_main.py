@@ -50,6 +50,10 @@ GIVEN = {
     "check": ["/nonexistent"],
     "eeprom": ["show", "/nonexistent"],
     "kinds": [],
+    "run": ["/nonexistent.toml"],
+    "export": ["/nonexistent", "--csv", "/nonexistent.csv"],
+    "diff": ["/nonexistent", "/nonexistent"],
+    "dissector": [],
 }
 
 
