@@ -24,6 +24,11 @@ Captured = pytest.CaptureFixture[str]
 ACK_10 = bytes.fromhex("02 01 0a 06")
 
 
+@pytest.fixture(scope="module")
+def _fonts() -> None:
+    load_fonts()
+
+
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     sink = BytesIO()
@@ -144,12 +149,12 @@ def test_what_is_wrong_is_one_line_and_status_2(
     assert text.format(**names) in line
 
 
+@pytest.mark.usefixtures("_fonts")
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_a_recording_is_drawn(
     recording: Path, tmp_path: Path, capsys: Captured, ending: str
 ) -> None:
-    load_fonts()
     axes, path = tmp_path / f"axes.{ending}", tmp_path / f"path.{ending}"
     assert run(["export", str(recording), "--plot", str(axes)]) == 0
     assert run(["export", str(recording), "--plot", str(path), "--xy", "10,11"]) == 0

@@ -35,6 +35,11 @@ expect = { node = 10, position = 40, state = "STANDBY", within = "2 s" }
 """
 
 
+@pytest.fixture(scope="module")
+def _fonts() -> None:
+    load_fonts()
+
+
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "x.toml"
@@ -193,9 +198,9 @@ def test_a_page_that_cannot_be_written_is_one_line(file: Path, capsys: Captured)
     )
 
 
+@pytest.mark.usefixtures("_fonts")
 @pytest.mark.slow
 def test_a_picture_is_drawn(file: Path, tmp_path: Path) -> None:
-    load_fonts()
     path = tmp_path / "a.svg"
     assert run(["run", str(file), "--plot", str(path)]) == 0
     assert b"1 node, 1 moved, 0.682769 s" in path.read_bytes()
@@ -210,11 +215,11 @@ def test_a_picture_that_is_not_drawn_is_told_before_anything_is_played(
     assert err.startswith("error: pictures are drawn as PNG or SVG, a.pdf, ")
 
 
+@pytest.mark.usefixtures("_fonts")
 @pytest.mark.slow
 def test_a_page_has_all_cases_with_pictures_and_how_to_repeat_each(
     file: Path, tmp_path: Path
 ) -> None:
-    load_fonts()
     path = tmp_path / "r.html"
     arguments = ["--set", "steps=[40,41]", "--seed", "3", "--report", str(path)]
     assert run(["run", str(file), *arguments]) == 1
