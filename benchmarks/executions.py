@@ -1,9 +1,10 @@
-"""What nodes executed on a line with bit errors, by a recording of it: for ``benchmarks.protection``.
+"""What nodes executed on a line with bit errors, by the recording of it.
 
-Owns the way from records to counts. Of each packet of mother's a recording has what was sent, what
-arrived, what was answered, and which nodes moved from then on, by which command. That a node
-executed something shows in that it moved, or in that it accepted: it may have obeyed a line that is
-no motion. Bit errors are the line's, so what arrived of a transmission arrived at everybody.
+Owns the way from records to counts, for ``benchmarks.protection``. Of each packet of mother's a
+recording has what was sent, what arrived, what was answered, and which nodes moved from then on, by
+which command. That a node executed something shows in that it moved, in that it acknowledged, or in
+that it reports a line that does nothing: damaged lines mostly are no motion. Bit errors are the line's, so what arrived of a transmission
+arrived at everybody.
 
 What is kept while reading is what belongs to one packet, and the counts.
 """
@@ -16,8 +17,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from sacbus.movement import Segment
+from sacbus.node import ReportKind
 from sacbus.trace import Recording
-from sacbus.trace.records import Moved, Record, Sent
+from sacbus.trace.records import Moved, Record, Sent, Told
 from sacbus.wire import ACK, MOTHER, ack, nak
 from sacbus.wire.times import ANSWER_BYTES
 
@@ -25,6 +27,9 @@ __all__ = ["RAMPS", "Executions"]
 
 #: How recorded commands end: the ramps that all nodes were given before the packets.
 RAMPS: Final = "a999d999"
+
+#: What a node reports of a line that it accepted and cannot execute.
+REFUSED: Final = ReportKind.REFUSED.value
 
 #: Bytes before a packet's body: STX, destination, source; and behind: ETX, verdict, NUL.
 HEADER: Final = 3
@@ -60,6 +65,8 @@ class _Slot:
                 found[one.node] = one.segment.command
             elif type(one) is Sent and isinstance(one.sender, int) and _accepts(one.data):
                 found.setdefault(one.sender, "")
+            elif type(one) is Told and one.node is not None and one.kind == REFUSED:
+                found.setdefault(one.node, "")
         return found
 
 
@@ -90,9 +97,7 @@ class Executions:
         return self._last[node].position(self._end)
 
     def _slots(self, recording: Recording) -> Iterator[_Slot]:
-        """One after the other. A transmission is recorded when it is over, so what was recorded
-        since it began, an answer that came too early, is found before it.
-        """
+        """One after the other, each once the next has been read."""
         slot: _Slot | None = None
         pending: list[Record] = []
         for record in recording:
@@ -101,6 +106,7 @@ class Executions:
             if type(record) is not Sent or record.sender != "mother":
                 pending.append(record)
                 continue
+            # It is recorded when it is over: what came while it was sent stands before it.
             if slot is not None:
                 slot.records = [one for one in pending if one.when <= record.start]
                 yield slot
@@ -111,7 +117,7 @@ class Executions:
             yield slot
 
     def _count(self, slot: _Slot) -> None:
-        """What became of a packet."""
+        """Count what became of a packet."""
         counts, node, sent, arrived = self.counts, slot.node, slot.packet.data, slot.packet.arrived
         self.sent[node, slot.line] += 1
         heard, executed = slot.heard(), slot.executed()
@@ -133,12 +139,16 @@ class Executions:
         counts["by others"] += sum(one != node for one in executed)
         counts["visible"] += arrived != sent
         counts["there"] += arrived[part] != sent[part]
-        who, did = next(iter(executed.items()))
-        others = f" and {len(executed) - 1} others" if len(executed) > 1 else ""
         self.wrong.append(
-            f"{kind}: sent {sent.hex(' ')}, arrived {arrived.hex(' ')}, "
-            f"node {who}{others}: {did or 'no motion'}"
+            f"{kind}: sent {sent.hex(' ')}, arrived {arrived.hex(' ')}, {_who(executed)}"
         )
+
+
+def _who(executed: dict[int, str]) -> str:
+    """Who did what, in words."""
+    node, command = next(iter(executed.items()))
+    others = f" and {len(executed) - 1} others" if len(executed) > 1 else ""
+    return f"node {node}{others}: {command or 'no motion'}"
 
 
 def _kind(slot: _Slot, executed: dict[int, str], *, right: bool) -> tuple[str, slice | None]:

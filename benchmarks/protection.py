@@ -14,6 +14,7 @@ import re
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from random import Random
 from typing import BinaryIO
@@ -129,8 +130,7 @@ class Study:
         self.account.clear()
         self.heard = b""
 
-    @property
-    def agree(self) -> bool:
+    def agrees(self) -> bool:
         """Whether nodes and mother tell the same as the recording, node by node."""
         return self.by_node == self.found.by_node and self.known == self.found.counts["heard"]
 
@@ -178,6 +178,11 @@ def table(study: Study, rate: float) -> list[str]:
     return found
 
 
+def _file(kept: Path | None) -> AbstractContextManager[BinaryIO]:
+    """An empty one for the recording; without a name one that is gone when it is closed."""
+    return tempfile.TemporaryFile() if kept is None else kept.open("w+b")
+
+
 def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="What nodes execute wrongly on a bad line.")
     parser.add_argument("--packets", type=int, default=1_000_000)
@@ -186,7 +191,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--record", type=Path, metavar="FILE", help="keep the recording there")
     parser.add_argument("--list", action="store_true", help="every wrong execution, line by line")
     options = parser.parse_args(argv)
-    with open(options.record, "w+b") if options.record else tempfile.TemporaryFile() as file:
+    with _file(options.record) as file:
         study = Study(options.packets, options.rate, options.seed, file)
     print(
         f"{options.packets} packets to {len(ADDRESSES)} nodes, bit errors at {options.rate:g}, "
@@ -198,7 +203,8 @@ def main(argv: list[str] | None = None) -> int:
     print(f"refused with NAK {counts['refused']}, lost in silence {counts['lost']}")
     print(f"executions by nodes that were not meant {counts['by others']}")
     print(
-        f"wrong or unchecked {len(found.wrong)}, damage visible in the recording {counts['visible']}, "
+        f"wrong or unchecked {len(found.wrong)}, "
+        f"damage visible in the recording {counts['visible']}, "
         f"where the class says {counts['there']}"
     )
     right, wrong, strange = study.motors()
@@ -206,10 +212,12 @@ def main(argv: list[str] | None = None) -> int:
         f"motors that stand where the lines bring them {right}, elsewhere {wrong}, "
         f"not judged {strange}"
     )
-    print(f"what nodes and mother tell agrees with the recording: {'yes' if study.agree else 'NO'}")
+    print(
+        f"what nodes and mother tell agrees with the recording: {'yes' if study.agrees() else 'NO'}"
+    )
     if options.list:
         print("\n".join(found.wrong))
-    return 0 if study.agree else 1
+    return 0 if study.agrees() else 1
 
 
 if __name__ == "__main__":
