@@ -3,8 +3,8 @@
 Owns the way from records to counts, for ``benchmarks.protection``. Of each packet of mother's a
 recording has what was sent, what arrived, what was answered, and which nodes moved from then on, by
 which command. That a node executed something shows in that it moved, in that it acknowledged, or in
-that it reports a line that does nothing: damaged lines mostly are no motion. Bit errors are the line's, so what arrived of a transmission
-arrived at everybody.
+that it reports a line that does nothing: damaged lines mostly are no motion. Bit errors are the
+line's, so what arrived of a transmission arrived at everybody.
 
 What is kept while reading is what belongs to one packet, and the counts.
 """
