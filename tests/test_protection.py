@@ -12,7 +12,7 @@ from benchmarks.executions import Executions
 from benchmarks.prediction import bound, turns, undetected
 from benchmarks.protection import ROWS, Study, main, table
 from sacbus.trace import read
-from sacbus.wire import crc8
+from sacbus.wire import MOTHER, ack, crc8, encode
 
 P = 0.1
 
@@ -93,6 +93,56 @@ def test_nodes_and_mother_tell_what_the_recording_says(study: Study) -> None:
     study.known -= 1
     assert not study.agrees()
     study.known += 1
+
+
+SENT = encode(10, MOTHER, b"m4v900")
+
+
+def damaged(place: int, byte: int) -> bytes:
+    """What mother sent, with another byte in one place."""
+    return SENT[:place] + bytes((byte,)) + SENT[place + 1 :]
+
+
+def found(arrived: bytes, *others: dict[str, object]) -> Executions:
+    """What is found of one packet to node 10 that arrived like this, and what is recorded after."""
+    nodes: list[object] = [{"address": one, "kind": "sac", "settings": {}} for one in (10, 11, 12)]
+    line = {"name": "bus", "protocol": "sac", "baud": 38_400, "bits": 10, "lanes": 1, "seed": 0}
+    bus = {"bus": 0, **line, "nodes": nodes}
+    head: dict[str, object] = {"sacbus": "recording", "format": 1, "buses": [bus]}
+    sent = {"is": "sent", "start": 0, "lane": 0, "from": "mother"}
+    packet = {**sent, "data": SENT.hex(), "arrived": arrived.hex()}
+    records = [{"t": 10 + at, "bus": 0, **one} for at, one in enumerate((packet, *others))]
+    lines = [json.dumps(one) + "\n" for one in (head, *records)]
+    return Executions(read(BytesIO("".join(lines).encode())))
+
+
+def acknowledges(node: int) -> dict[str, object]:
+    data = ack(MOTHER, node).hex()
+    return {"is": "sent", "start": 20, "lane": 0, "from": node, "data": data}
+
+
+def reports(node: int, kind: str = "refused") -> dict[str, object]:
+    return {"is": "report", "node": node, "kind": kind, "text": "the line does nothing"}
+
+
+ONE_PACKET = {
+    "other node": (damaged(1, 11), [acknowledges(11)]),
+    "everybody": (damaged(1, 0), [reports(10), reports(11), reports(12)]),
+    "undetected": (damaged(3, 0), [acknowledges(10)]),
+    "unchecked wrong": (damaged(-2, 0)[:3] + b"n" + damaged(-2, 0)[4:], [acknowledges(10)]),
+    "lost": (damaged(0, 0), [reports(10, "lost")]),
+}
+
+
+@pytest.mark.parametrize("kind", ONE_PACKET)
+def test_a_packet_is_counted_by_who_is_seen_to_have_accepted_it_and_what_was_damaged(
+    kind: str,
+) -> None:
+    arrived, others = ONE_PACKET[kind]
+    counts = found(arrived, *others).counts
+    assert counts[kind] == 1
+    wrong = kind != "lost"
+    assert counts["visible"] == counts["there"] == wrong
 
 
 def without(recorded: BytesIO, kind: str) -> Executions:
