@@ -54,8 +54,11 @@ def _share_out(lines: int, seed: int, jobs: int) -> int:
         for job in range(jobs)
     ]
     # Ctrl-C goes to the jobs too, which say how far they were: wait for that.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    ended = [job.wait() for job in running]
+    heeded = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        ended = [job.wait() for job in running]
+    finally:
+        signal.signal(signal.SIGINT, heeded)
     return max(status if status >= 0 else 1 for status in ended)
 
 
