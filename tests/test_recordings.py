@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
+from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -102,6 +105,87 @@ def test_export_says_when_a_recording_was_cut_off(
         rf"note: {recording} was cut off at \d\.\d+ s: it was not closed\n",
         capsys.readouterr().err,
     )
+
+
+EXPORTS = ["--vcd", "--csv", "--positions", "--pcap", "--plot"]
+
+
+@pytest.mark.parametrize("option", EXPORTS)
+def test_a_recording_is_not_written_over(
+    recording: Path, tmp_path: Path, capsys: Captured, option: str
+) -> None:
+    before = recording.read_bytes()
+    link, hard = tmp_path / "link", tmp_path / "hard"
+    link.symlink_to(recording)
+    hard.hardlink_to(recording)
+    for place in (recording, link, hard):
+        assert run(["export", str(recording), option, str(place)]) == 2
+        assert capsys.readouterr() == (
+            "",
+            (
+                f"error: {option}: expected a file of its own, got {place}, which is read, "
+                "see sacbus export --help\n"
+            ),
+        )
+    assert recording.read_bytes() == before
+
+
+def test_two_exports_are_not_written_to_one_file(
+    recording: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    place = tmp_path / "x.svg"
+    for one, other in pairwise(EXPORTS):
+        assert run(["export", str(recording), one, str(place), other, str(place)]) == 2
+        assert f"got {place}, which is that of {one}, see" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [recording]
+
+
+@pytest.mark.parametrize("option", EXPORTS[:4])
+def test_an_export_that_fails_leaves_what_was_there(
+    recording: Path, tmp_path: Path, option: str
+) -> None:
+    recording.write_bytes(recording.read_bytes() + b"x\n")
+    place = tmp_path / "out"
+    assert run(["export", str(recording), option, str(place)]) == 2
+    assert list(tmp_path.iterdir()) == [recording]
+    place.write_text("before")
+    assert run(["export", str(recording), option, str(place)]) == 2
+    assert place.read_text() == "before"
+
+
+@pytest.mark.parametrize("option", EXPORTS[:4])
+def test_an_export_goes_through_a_pipe(recording: Path, tmp_path: Path, option: str) -> None:
+    pipe, place = tmp_path / "pipe", tmp_path / "out"
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as reader:
+        got = reader.submit(pipe.read_bytes)
+        assert run(["export", str(recording), option, str(pipe)]) == 0
+        assert run(["export", str(recording), option, str(place)]) == 0
+        assert got.result(10) == place.read_bytes() != b""
+    assert pipe.is_fifo()
+
+
+def test_exports_to_devices_go_on_working(recording: Path) -> None:
+    asked = [word for option in EXPORTS[:4] for word in (option, "/dev/null")]
+    assert run(["export", str(recording), *asked]) == 0
+
+
+def test_diff_says_which_was_cut_off(recording: Path, tmp_path: Path, capsys: Captured) -> None:
+    cut, others = tmp_path / "cut.jsonl", tmp_path / "others.jsonl"
+    lines = recording.read_bytes().splitlines(keepends=True)
+    cut.write_bytes(b"".join(lines[:-1]))
+    others.write_bytes(b"".join([lines[0].replace(b'"name":"bus"', b'"name":"x"'), *lines[1:]]))
+    assert others.read_bytes() != recording.read_bytes()
+    note = rf"note: {cut} was cut off at \d\.\d{{6}} s: it was not closed\n"
+    run(["diff", str(recording), str(cut)])
+    assert re.fullmatch(note, capsys.readouterr().err)
+    run(["diff", str(cut), str(cut), "--json"])
+    assert re.fullmatch(note * 2, capsys.readouterr().err)
+    # The buses tell them apart before a record is read.
+    assert run(["diff", str(others), str(cut)]) == 1
+    assert re.fullmatch(note, capsys.readouterr().err)
+    assert run(["diff", str(others), str(recording)]) == 1
+    assert capsys.readouterr().err == ""
 
 
 def test_diff_of_the_same_is_silent_and_status_0(recording: Path, capsys: Captured) -> None:

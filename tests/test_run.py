@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import shlex
@@ -9,6 +10,7 @@ import signal
 import subprocess
 import sys
 from html import unescape
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -192,10 +194,86 @@ def test_pins_are_written_as_vcd(file: Path, tmp_path: Path) -> None:
 
 
 def test_a_page_that_cannot_be_written_is_one_line(file: Path, capsys: Captured) -> None:
-    assert run(["run", str(file), "--record", str(file.parent / "no" / "r")]) == 1
-    assert capsys.readouterr().err == (
-        f"error: No such file or directory, {file.parent / 'no' / 'r'}\n"
-    )
+    assert run(["run", str(file), "--record", str(file.parent)]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+
+
+OUTPUTS = ["--record", "--vcd", "--pcap", "--plot", "--report", "--junit"]
+
+
+@pytest.mark.parametrize("option", OUTPUTS)
+def test_a_directory_that_is_missing_is_told_before_anything_is_played(
+    file: Path, capsys: Captured, option: str
+) -> None:
+    for directory, what in (
+        (file.parent / "no", "does not exist"),
+        (file, "is not a directory"),
+    ):
+        place = directory / "x.svg"
+        assert run(["run", str(file), option, str(place)]) == 2
+        told = f"error: {option}: cannot write {place}, {directory} {what}\n"
+        assert capsys.readouterr() == ("", told)
+
+
+@pytest.mark.parametrize("option", OUTPUTS)
+def test_a_scenario_is_not_written_over(
+    file: Path, tmp_path: Path, capsys: Captured, option: str
+) -> None:
+    link, hard = tmp_path / "link", tmp_path / "hard"
+    link.symlink_to(file)
+    hard.hardlink_to(file)
+    for place in (file, tmp_path / ".." / tmp_path.name / file.name, link, hard):
+        assert run(["run", str(file), option, str(place)]) == 2
+        assert capsys.readouterr() == (
+            "",
+            (
+                f"error: {option}: expected a file of its own, got {place}, which is read, "
+                "see sacbus run --help\n"
+            ),
+        )
+    assert file.read_text() == PASSES
+
+
+def test_two_outputs_are_not_written_to_one_file(
+    file: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    place = tmp_path / "x.svg"
+    for one, other in pairwise(OUTPUTS):
+        assert run(["run", str(file), one, str(place), other, str(place)]) == 2
+        assert capsys.readouterr() == (
+            "",
+            (
+                f"error: {other}: expected a file of its own, got {place}, which is that of {one}, "
+                "see sacbus run --help\n"
+            ),
+        )
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_devices_and_standard_output_may_be_shared(file: Path, capsys: Captured) -> None:
+    shared = ["--vcd", "/dev/null", "--pcap", "/dev/null", "--junit", "-"]
+    assert run(["run", str(file), *shared]) == 0
+    assert "<testsuite" in capsys.readouterr().out
+
+
+def test_what_cannot_be_written_to_its_end_leaves_what_was_there(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    vcd, pcap = tmp_path / "x.vcd", tmp_path / "x.pcapng"
+    for option, place, name in (
+        ("--vcd", vcd, "sacbus.trace.vcd.write_vcd"),
+        ("--pcap", pcap, "sacbus.trace.write_pcapng"),
+    ):
+        place.write_text("before")
+        with monkeypatch.context() as patch:
+            patch.setattr(name, broken)
+            assert run(["run", str(file), option, str(place)]) == 1
+    assert [vcd.read_text(), pcap.read_text()] == ["before", "before"]
+    assert sorted(tmp_path.iterdir()) == sorted([file, vcd, pcap])
 
 
 @pytest.mark.usefixtures("_fonts")

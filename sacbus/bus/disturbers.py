@@ -7,12 +7,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import log
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from sacbus.bus.fault import FaultError, FaultOn
 from sacbus.kernel import SECOND, Ns
 
 __all__ = ["Babble", "NoiseBursts"]
+
+#: Bursts per second: one in twelve days, and more than a line has bytes for.
+RAREST: Final = 1e-6
+DENSEST: Final = 1_000_000
+
+#: Bytes of a burst.
+LARGEST: Final = 65_536
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +36,13 @@ class NoiseBursts:
     def __post_init__(self) -> None:
         if not self.per_second > 0:
             raise FaultError(self.name, "more than 0 bursts per second", self.per_second)
+        if not RAREST <= self.per_second <= DENSEST:
+            wanted = f"{RAREST:g} to {DENSEST} bursts per second"
+            raise FaultError(self.name, wanted, self.per_second)
         if self.bytes < 1:
             raise FaultError(self.name, "1 or more bytes a burst", self.bytes)
+        if self.bytes > LARGEST:
+            raise FaultError(self.name, f"{LARGEST} bytes a burst at most", self.bytes)
 
     def put_on(self, on: FaultOn) -> None:
         """As :meth:`Fault.put_on`."""

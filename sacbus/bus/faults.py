@@ -22,7 +22,7 @@ __all__ = ["FAULTS", "fault_from"]
 STRANGER: Final = "stranger"
 
 _UNITS: Final[Mapping[str, Ns]] = {"ns": 1, "us": US, "ms": MS, "s": SECOND}
-_TIME: Final = re.compile(r"(\d+)(?:\.(\d{1,9}))? ?(ns|us|ms|s)")
+_TIME: Final = re.compile(r"(\d{1,12})(?:\.(\d{1,9}))? ?(ns|us|ms|s)")
 _A_TIME: Final = 'a time with its unit such as "16 ms"'
 _HEX: Final = re.compile(r"[0-9a-fA-F]{2}( ?[0-9a-fA-F]{2})*")
 
@@ -56,7 +56,10 @@ class _Values:
         if found is None:
             raise self._wrong(name, _A_TIME, value)
         unit, parts = _UNITS[found[3]], found[2] or "0"
-        part: Ns = int(parts) * unit // 10 ** len(parts)
+        scale: int = 10 ** len(parts)
+        part, beyond = divmod(int(parts) * unit, scale)
+        if beyond:
+            raise self._wrong(name, "a time in whole ns", value)
         return int(found[1]) * unit + part
 
     def address(self, name: str) -> int:

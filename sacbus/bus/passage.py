@@ -184,7 +184,9 @@ class Passage:
         """All that arrived, where nobody was kept from hearing it."""
         if self.silent:
             return b""
-        return b"".join(piece.arrived(0, len(piece.data), seed) for piece in self._over())
+        return b"".join(
+            piece.arrived(0, len(piece.data), seed) for piece in self._struck(self.pieces())
+        )
 
     def heard_by(self, listener: int | None, seed: int) -> bytes:
         """All that came to one who listened: the node of an address, or EVERY_LINK."""
@@ -193,18 +195,21 @@ class Passage:
         rate = None if listener is None else self.receivers.get(listener)
         if rate is None:
             return self.outcome(seed)
-        pieces = self.as_read_at(rate).pieces(rate)
-        return b"".join(piece.data for piece in pieces)
+        pieces = self._struck(self.as_read_at(rate).pieces(rate))
+        return b"".join(piece.arrived(0, len(piece.data), seed) for piece in pieces)
 
     def outcome_ninth(self, seed: int) -> bytes | None:
         """The ninth bits that belong to :meth:`outcome`; None where none were sent."""
         if self.ninth is None or self.silent:
             return None
-        bits = [piece.ninth_bits(0, len(piece.data), seed) or b"" for piece in self._over()]
+        bits = [
+            piece.ninth_bits(0, len(piece.data), seed) or b""
+            for piece in self._struck(self.pieces())
+        ]
         return b"".join(bits)
 
-    def _over(self) -> list[Transmission]:
-        pieces = self.pieces()
+    def _struck(self, pieces: list[Transmission]) -> list[Transmission]:
+        """What overlapped the whole overlapped its pieces."""
         for piece in pieces:
             piece.hits = self.sent.hits
         return pieces

@@ -8,7 +8,7 @@ from dataclasses import asdict
 import click
 
 from sacbus.cli.options import verbose
-from sacbus.cli.recordings import opened, span
+from sacbus.cli.recordings import note_cut_off, opened, span
 
 __all__ = ["diff_command"]
 
@@ -54,9 +54,16 @@ def diff_command(
     """
     from sacbus.trace.difference import differences
 
-    found = differences(opened(expected), opened(got), within=within, steps=steps)
+    both = [opened(expected), opened(got)]
+    found = differences(*both, within=within, steps=steps)
+    for recording in both:
+        if not recording.end:  # of other buses, say: whether it was cut off is not known yet
+            for _ in recording:
+                pass
     for one in found[:most]:
         click.echo(json.dumps(asdict(one)) if as_json else str(one))
     if len(found) > most and not as_json:
         click.echo(f"and {len(found) - most} more")
+    for recording in both:
+        note_cut_off(recording)
     return DIFFERENT if found else 0

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, TextIO
 import click
 
 from sacbus.cli.options import WrongInput, read_addresses, verbose
-from sacbus.cli.recordings import opened, picture_form, span
+from sacbus.cli.recordings import (
+    fresh_text,
+    note_cut_off,
+    opened,
+    picture_form,
+    refuse_shared_files,
+    span,
+)
 from sacbus.fresh import fresh_file
 
 if TYPE_CHECKING:
@@ -111,7 +118,14 @@ def export_command(
     from sacbus.trace.tables import write_events, write_positions
     from sacbus.trace.vcd import write_vcd
 
-    if all(path is None for path in (vcd, events, positions, pcap, picture)):
+    outputs = {
+        "--vcd": vcd,
+        "--csv": events,
+        "--positions": positions,
+        "--pcap": pcap,
+        "--plot": picture,
+    }
+    if all(path is None for path in outputs.values()):
         raise click.UsageError(
             "nothing to write: give --vcd, --csv, --positions, --pcap or --plot a file"
         )
@@ -121,6 +135,7 @@ def export_command(
         raise click.UsageError("expected --nodes or --xy, got both")
     if every == 0:
         raise click.BadParameter("expected a time above 0, got '0'", param_hint="--every")
+    refuse_shared_files(outputs, [recording])
     form = None if picture is None else picture_form(picture)
     read = opened(recording)
     jobs: list[tuple[Path | None, str, Callable[[TextIO], int]]] = [
@@ -130,20 +145,17 @@ def export_command(
     ]
     for path, what, write in jobs:
         if path is not None:
-            with path.open("w", encoding="utf-8", newline="") as out:
+            with fresh_text(path) as out:
                 written = write(out)
             click.echo(f"{path}: {written} {what}")
     if pcap is not None:
-        with pcap.open("wb") as file:
+        with fresh_file(pcap) as file:
             written = write_pcapng(read, file)
         click.echo(f"{pcap}: {written} packets")
     if picture is not None and form is not None:
         _draw(read, picture, form, nodes, xy)
         click.echo(f"{picture}: drawn")
-    if not read.whole:
-        click.echo(
-            f"note: {recording} was cut off at {read.end / 1e9:.6f} s: it was not closed", err=True
-        )
+    note_cut_off(read)
     return 0
 
 

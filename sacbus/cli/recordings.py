@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TextIO
 
 import click
 
 from sacbus.cli.options import WrongInput
+from sacbus.fresh import fresh_file
 from sacbus.picture_format import PictureError, picture_format
 
 if TYPE_CHECKING:
     from sacbus.trace import Recording
 
-__all__ = ["opened", "picture_form", "span"]
+__all__ = [
+    "fresh_text",
+    "note_cut_off",
+    "opened",
+    "picture_form",
+    "refuse_missing_directories",
+    "refuse_shared_files",
+    "span",
+]
 
 _UNITS: Final = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 _SPAN: Final = re.compile(r"(\d{1,9})(?:\.(\d{1,9}))?\s*(ns|us|ms|s)")
@@ -42,6 +54,60 @@ def opened(path: str) -> Recording:
         raise WrongInput(str(fault)) from fault
     except OSError as fault:
         raise WrongInput(f"{path}: {fault.strerror}, name a recording") from fault
+
+
+def note_cut_off(recording: Recording) -> None:
+    """Say that what was read is not all that happened; only a walk to its end finds that out."""
+    if not recording.whole:
+        seconds = f"{recording.end / 1e9:.6f} s"
+        click.echo(f"note: {recording.name} was cut off at {seconds}: it was not closed", err=True)
+
+
+def refuse_shared_files(outputs: Mapping[str, str | Path | None], inputs: Iterable[str]) -> None:
+    """Refuse an output that is an input or another output, before one destroys the other.
+
+    ``outputs``: by option. A device or a pipe holds nothing that could be lost: it may be shared.
+    """
+    taken = [(Path(one), "which is read") for one in inputs]
+    for option, place in outputs.items():
+        if place is None:
+            continue
+        path = Path(place)
+        if path.exists() and not path.is_file():
+            continue
+        for other, why in taken:
+            if _is_same(path, other):
+                raise click.UsageError(f"{option}: expected a file of its own, got {place}, {why}")
+        taken.append((path, f"which is that of {option}"))
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    """Whether two names are of one file, which need not exist yet."""
+    if path.exists() and other.exists():
+        return path.samefile(other)  # hard links too
+    return path.resolve() == other.resolve()
+
+
+def refuse_missing_directories(outputs: Mapping[str, str | Path | None]) -> None:
+    """Refuse outputs that no file can be made for, before what is to be kept takes its time."""
+    for option, place in outputs.items():
+        if place is None:
+            continue
+        directory = Path(place).parent
+        if not directory.is_dir():
+            what = "is not a directory" if directory.exists() else "does not exist"
+            raise WrongInput(f"{option}: cannot write {place}, {directory} {what}")
+
+
+@contextmanager
+def fresh_text(path: Path) -> Iterator[TextIO]:
+    """A :func:`fresh_file` for text, whose line ends are left as they are."""
+    with fresh_file(path) as file:
+        text = TextIOWrapper(file, encoding="utf-8", newline="")
+        try:
+            yield text
+        finally:
+            text.detach()  # what is written goes to the file, which is not this one's to close
 
 
 def picture_form(place: str | Path) -> str:

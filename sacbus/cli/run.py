@@ -14,7 +14,12 @@ from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
 import click
 
 from sacbus.cli.options import verbose
-from sacbus.cli.recordings import picture_form
+from sacbus.cli.recordings import (
+    fresh_text,
+    picture_form,
+    refuse_missing_directories,
+    refuse_shared_files,
+)
 from sacbus.cli.report import Report
 from sacbus.fresh import fresh_file
 
@@ -26,6 +31,9 @@ __all__ = ["run_command"]
 
 #: Seconds until a scenario counts as slow, and between two words about how far it is.
 SLOW: Final = 1.0
+
+#: The name of standard input among scenarios, and of standard output for JUnit XML.
+STANDARD: Final = "-"
 
 
 def _read_parameters(
@@ -128,6 +136,12 @@ def run_command(
         )
     if speed is not None and not real:
         raise click.UsageError("--speed: expected only with --real")
+    outputs = {
+        **pages,
+        "--report": report,
+        "--junit": None if junit is None or junit.name == STANDARD else junit.name,
+    }
+    refuse_shared_files(outputs, [one for one in files if one != STANDARD])
     chosen = _read(files, parameters, seed, word, line_only=link is not None)
     if not chosen:
         raise click.UsageError(f"-k: no file, title or case has {word!r} in it")
@@ -135,6 +149,7 @@ def run_command(
         raise click.UsageError(
             f"{kept[0]}: expected one scenario of one case, got {len(chosen)}, use -k or --set"
         )
+    refuse_missing_directories(outputs)
     form = "" if picture is None else picture_form(picture)
     page = None if report is None else Report(report, parameters, _how(seed, real, link, speed))
     recorded = bool(kept) or (page is not None and link is None)
@@ -225,12 +240,12 @@ def _export(recording: Recording, vcd: str | None, pcap: str | None) -> None:
     if vcd is not None:
         from sacbus.trace.vcd import write_vcd
 
-        with Path(vcd).open("w", encoding="utf-8", newline="") as page:
+        with fresh_text(Path(vcd)) as page:
             write_vcd(recording, page)
     if pcap is not None:
         from sacbus.trace import write_pcapng
 
-        with Path(pcap).open("wb") as file:
+        with fresh_file(Path(pcap)) as file:
             write_pcapng(recording, file)
 
 

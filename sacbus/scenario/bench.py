@@ -30,6 +30,10 @@ LOOK: Final[Ns] = 1 * MS
 KEPT: Final = 4
 
 
+#: What counts as a warning: what was not obeyed, or perhaps not as it was meant.
+_WARN: Final = (ReportKind.WARNING, ReportKind.REFUSED, ReportKind.OVERRUN)
+
+
 class Bench:
     """One bus under a scenario. Everything is called at the time of ``clock``.
 
@@ -186,7 +190,7 @@ def _watch(bench: Bench, hosted: HostedBus) -> None:
         bench.stir()
 
     def report(told: Report) -> None:
-        if told.kind is ReportKind.WARNING:
+        if told.kind in _WARN:
             bench.warnings[told.address] += 1
             bench.warned.append((told.when, str(told)))
 

@@ -112,7 +112,8 @@ class Counted:
     """Counts since the beginning of the scenario, of one node's or of all, within these bounds.
 
     ``counts``: bounds by the names of :data:`COUNTS`. Retries, NAKs, ACKs and time-outs are
-    mother's; collisions are the line's and warnings the reports of nodes and line.
+    mother's, collisions the line's. Warnings are what nodes and line report of lines refused, of
+    queues overrun, and of what may not be as it was meant.
     """
 
     counts: Mapping[str, Bounds]

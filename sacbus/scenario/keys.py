@@ -353,7 +353,7 @@ EXPECT: Final = (
     Key("acks", _BOUNDS, _is_bounds, "ACKs that mother got"),
     Key("timeouts", _BOUNDS, _is_bounds, "answers that mother waited for in vain"),
     Key("collisions", _BOUNDS, _is_bounds, "transmissions that another one overlapped"),
-    Key("warnings", _BOUNDS, _is_bounds, "warnings of nodes and of the line"),
+    Key("warnings", _BOUNDS, _is_bounds, "warnings, lines refused, queues overrun"),
     Key("within", TIME, _is_time, "how long it may take", otherwise="it must be so at once"),
     Key("for", TIME, _is_time, "it must stay so for that long", otherwise="once is enough"),
 )

@@ -45,7 +45,7 @@ def given(text: str) -> tuple[str, object]:
         raise ValueError(f"expected NAME=VALUE, got {text!r}")
     try:
         read: object = tomllib.loads(f"x = {value}")["x"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         read = value
     if not is_value(read):
         raise ValueError(f"expected a number, a text, true or false, or a list, got {value!r}")

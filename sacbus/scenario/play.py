@@ -41,21 +41,33 @@ from sacbus.scenario.values import (
     Type,
 )
 
-__all__ = ["Play", "predecessor"]
+__all__ = ["Play", "predecessors"]
 
 
-def predecessor(steps: tuple[Step, ...], index: int) -> int | None:
-    """The step whose end a step waits for; None for one that begins by the clock or with the play.
+def predecessors(steps: tuple[Step, ...]) -> list[int | None]:
+    """By step, that whose end it waits for; None: it begins by the clock or with the play.
 
     A name is that of the nearest step above; or else of the first one below.
     """
-    step = steps[index]
-    if step.at is not None:
-        return None
-    if not isinstance(step.after, str):
-        return index - 1 if index else None
-    order = [*range(index - 1, -1, -1), *range(index + 1, len(steps))]
-    return next((other for other in order if steps[other].name == step.after), None)
+    named: dict[str, list[int]] = {}
+    for index, step in enumerate(steps):
+        if step.name:
+            named.setdefault(step.name, []).append(index)
+    above: dict[str, int] = {}
+    found: list[int | None] = []
+    for index, step in enumerate(steps):
+        if step.at is not None:
+            found.append(None)
+        elif not isinstance(step.after, str):
+            found.append(index - 1 if index else None)
+        elif step.after in above:
+            found.append(above[step.after])
+        else:
+            below = (other for other in named.get(step.after, ()) if other != index)
+            found.append(next(below, None))
+        if step.name:
+            above[step.name] = index
+    return found
 
 
 class Play:
@@ -84,11 +96,10 @@ class Play:
         for bench in self._benches.values():
             bench.begin(self._origin)
         steps = self._scenario.steps
-        for index, step in enumerate(steps):
+        for index, (step, before) in enumerate(zip(steps, predecessors(steps), strict=True)):
             for deed in (step.does, step.after):
                 if isinstance(deed, Shown):
                     self._bench(deed.bus).listen(deed.node)
-            before = predecessor(steps, index)
             if before is not None:
                 self._followers[before].append(index)
             else:

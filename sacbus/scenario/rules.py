@@ -29,7 +29,7 @@ from sacbus.scenario.expectations import (
     Straight,
     Together,
 )
-from sacbus.scenario.play import predecessor
+from sacbus.scenario.play import predecessors
 from sacbus.scenario.quantity import time_text
 from sacbus.scenario.values import (
     Deed,
@@ -89,6 +89,12 @@ def complaints(scenario: Scenario) -> Iterator[Complaint]:
     if not scenario.buses:
         yield Complaint(None, "bus", "expected one bus at least, got none", "add one")
         return
+    names = [bus.name for bus in scenario.buses]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        what = f"expected a name of its own for each, got {twice[0]!r} twice"
+        yield Complaint(None, "bus", what, "name them")
+        return
     for bus in scenario.buses:
         check(bus)
     rules = _Rules(scenario)
@@ -145,6 +151,8 @@ class _Rules:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._buses = {bus.name: bus for bus in scenario.buses}
+        self._before = predecessors(scenario.steps)
+        self._circular = _circular(self._before)
         self._aside: dict[tuple[str, int], Node] = {}
         self._kind = cache(find_kind)
 
@@ -162,7 +170,7 @@ class _Rules:
         if step.at is not None and end is not None and step.at > end:
             what = f"expected a time up to the end at {time_text(end)}, got {time_text(step.at)}"
             yield "at", what, "correct it"
-        if isinstance(step.after, str) and predecessor(steps, index) is None:
+        if isinstance(step.after, str) and self._before[index] is None:
             names = sorted({one.name for one in steps if one.name and one is not step})
             known = f"; known are {', '.join(names)}" if names else "; no other step has one"
             yield (
@@ -170,15 +178,9 @@ class _Rules:
                 f"expected the name of another step, got {step.after!r}",
                 f"correct it{known}",
             )
-        elif isinstance(step.after, str):
-            seen = {index}
-            before = predecessor(steps, index)
-            while before is not None and before not in seen:
-                seen.add(before)
-                before = predecessor(steps, before)
-            if before == index:
-                what = f"expected a step that does not wait for this one, got {step.after!r}"
-                yield "after", what, "correct it"
+        elif isinstance(step.after, str) and index in self._circular:
+            what = f"expected a step that does not wait for this one, got {step.after!r}"
+            yield "after", what, "correct it"
         times = (step.at, step.wait)
         if any(one is not None and one < 0 for one in times):
             yield "at", "expected a time from 0 on, got a negative one", "correct it"
@@ -196,6 +198,8 @@ class _Rules:
             return
         match deed:
             case Send(lines=lines, outcome=outcome) | Poll(lines=lines, outcome=outcome):
+                if not lines:
+                    yield "send", "expected one line at least, got none", "give one"
                 for line in lines:
                     yield from self._line(bus, line, outcome)
                 if isinstance(deed, Poll) and deed.every <= 0:
@@ -208,7 +212,9 @@ class _Rules:
             case Shown(node=node):
                 yield from self._nodes(bus, (node,), key or "expect")
                 yield from self._terminals(bus, (node,), key or "expect")
-            case Type(nodes=nodes):
+            case Type(nodes=nodes, keys=keys):
+                if any(ord(one) > 0xFF for one in keys):
+                    yield "type", f"expected characters of one byte, got {keys!r}", "correct it"
                 yield from self._nodes(bus, nodes, "type")
                 yield from self._terminals(bus, nodes, "type")
             case Pin(nodes=nodes, levels=levels):
@@ -224,13 +230,15 @@ class _Rules:
                 yield from self._nodes(bus, nodes, key or "expect")
                 yield from self._has_pins(bus, nodes, pins, key or "expect")
             case Counted(nodes=nodes):
-                yield from self._nodes(bus, nodes or (), key or "expect")
+                if nodes is not None:
+                    yield from self._nodes(bus, nodes, key or "expect")
             case Together(nodes=nodes) | Straight(nodes=nodes):
                 yield from self._nodes(bus, nodes, key or "expect")
                 if len(nodes) < 2:
                     yield key or "expect", "expected two nodes at least, got one", "name them"
             case Disturb(fault=fault):
-                yield from self._nodes(bus, _nodes_of(fault), "fault")
+                if named := _nodes_of(fault):
+                    yield from self._nodes(bus, named, "fault")
             case Lift(step=name):
                 yield from self._fault_steps(name)
             case Pause() | Mark() | Silent():
@@ -260,7 +268,10 @@ class _Rules:
                 yield from self._nodes(bus, (node,), "send")
 
     def _nodes(self, bus: Configuration, nodes: Iterable[int], key: str) -> Iterator[_Found]:
+        nodes = tuple(nodes)
         there = [one.address for one in bus.every_node]
+        if not nodes:
+            yield key, "expected one node at least, got none", "name one"
         missing = [one for one in nodes if one not in there]
         if missing:
             have = f"nodes of bus {bus.name!r} ({ranges(there) or 'it has none'})"
@@ -317,6 +328,25 @@ class _Rules:
                 settings = settings_from(kind.settings, at.settings)
                 self._aside[made] = kind.create(at.address, settings, LineRate(), _ignore)
             yield at.address, self._aside[made]
+
+
+def _circular(before: list[int | None]) -> set[int]:
+    """The steps that wait for themselves, by way of others."""
+    found: set[int] = set()
+    walks: dict[int, int] = {}  # in which walk each step was come to, by where that began
+    for begin in range(len(before)):
+        place: int | None = begin
+        while place is not None and place not in walks:
+            walks[place] = begin
+            place = before[place]
+        if place is None or walks[place] != begin:
+            continue
+        while place not in found:
+            found.add(place)
+            after = before[place]
+            assert after is not None, "a circle has no end"
+            place = after
+    return found
 
 
 def _nodes_of(fault: Fault) -> tuple[int, ...]:

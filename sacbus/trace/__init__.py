@@ -1,9 +1,10 @@
 """Recordings: what happened on buses, kept in a file and read back.
 
 ``Recorder`` writes one (``recorder.py``), ``read`` gives it back (``reading.py``) as records
-(``records.py``) and as the track of each node (``track.py``). ``write_pcapng`` makes a capture of
-one (``exchange.py``), for Wireshark; what a capture is, ``capture.py`` and ``pcapng.py`` know, and
-the monitor writes them as well. Names load what they need on first use: it needs no recordings.
+(``records.py``), as the track of each node (``track.py``), and of several as the axes of a path
+(``paths.py``). ``write_pcapng`` makes a capture of one (``exchange.py``), for Wireshark; what a
+capture is, ``capture.py`` and ``pcapng.py`` know, and the monitor writes them as well. Names load
+what they need on first use: it needs no recordings.
 """
 
 from __future__ import annotations
@@ -13,17 +14,29 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from sacbus.trace.exchange import write_pcapng
+    from sacbus.trace.paths import RESTS, last_path
     from sacbus.trace.reading import Recording, RecordingError, read
     from sacbus.trace.recorder import Recorder
     from sacbus.trace.track import Track
 
-__all__ = ["Recorder", "Recording", "RecordingError", "Track", "read", "write_pcapng"]
+__all__ = [
+    "RESTS",
+    "Recorder",
+    "Recording",
+    "RecordingError",
+    "Track",
+    "last_path",
+    "read",
+    "write_pcapng",
+]
 
 _HOMES: Final = {
+    "RESTS": "paths",
     "Recorder": "recorder",
     "Recording": "reading",
     "RecordingError": "reading",
     "Track": "track",
+    "last_path": "paths",
     "read": "reading",
     "write_pcapng": "exchange",
 }

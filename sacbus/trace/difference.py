@@ -74,8 +74,23 @@ def differences(
     ]
     if nodes[0] != nodes[1]:
         return [Difference(0, "recording", None, "nodes", _listed(nodes[0]), _listed(nodes[1]))]
-    found = _of_alike(expected, got, within, steps)
-    return sorted(found, key=lambda one: one.when)  # stable: bus by bus, node by node
+    found = list(_of_alike(expected, got, within, steps))
+    found.sort(key=lambda one: one.when)  # stable: bus by bus, node by node
+    return found + _of_ends(expected, got, within, alike=not found)
+
+
+def _of_ends(expected: Recording, got: Recording, within: Ns, *, alike: bool) -> list[Difference]:
+    """One that was killed has less to say, and all that it says may be right.
+
+    When they end is told only of those that are ``alike`` until then.
+    """
+    ends = (expected.end, got.end)
+    told = ["closed" if each.whole else "cut off" for each in (expected, got)]
+    if told[0] == told[1]:
+        if not alike or abs(ends[0] - ends[1]) <= within:
+            return []
+        told = [f"{end / 1e9:.9f} s" for end in ends]
+    return [Difference(min(ends), "recording", None, "its end", *told)]
 
 
 def _of_alike(
@@ -93,6 +108,8 @@ def _of_alike(
         name = expected.buses[node.bus].name
         tracks = [each.track(node.address, node.bus) for each in (expected, got)]
         if not (tracks[0].segments and tracks[1].segments):
+            for when, one, other in _began(tracks[0], tracks[1]):
+                yield Difference(when, name, node.address, "motion", one, other)
             continue
         states = [
             [_Entry(when, state) for when, state in track.states(0, over + 1)] for track in tracks
@@ -103,6 +120,17 @@ def _of_alike(
         if apart is not None:
             places = [f"{track.steps(apart):g} steps" for track in tracks]
             yield Difference(apart, name, node.address, "position", *places)
+
+
+def _began(expected: Track, got: Track) -> Iterator[tuple[Ns, str, str]]:
+    """Of two nodes of which one at least tells nothing: when the other began to."""
+    words = [
+        f"told from {track.segments[0].since} ns on" if track.segments else NOTHING
+        for track in (expected, got)
+    ]
+    if words[0] != words[1]:
+        (told,) = (track for track in (expected, got) if track.segments)
+        yield told.segments[0].since, words[0], words[1]
 
 
 def _entry(packet: Packet) -> _Entry:

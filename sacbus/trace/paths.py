@@ -1,13 +1,13 @@
-"""The path of two nodes as the axes of a plane, and how far it left the straight line.
+"""The path of nodes as the axes of a space, and how far it left the straight line.
 
 Owns where one motion ends and the next begins: a motion is everything from one instant at which
-both nodes rest to the next. Each is measured against the straight line between its two ends.
+all of the nodes rest to the next. Each is measured against the straight line between its two ends.
 Positions in full steps, times in ns of bus time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Times = NDArray[np.int64]
 
-__all__ = ["RESTS", "Path", "off_line", "paths"]
+__all__ = ["RESTS", "Path", "last_path", "off_line", "paths"]
 
 #: States in which a motor stands, whatever the kind. SYNC: held, and not begun.
 RESTS: Final = frozenset({"STANDBY", "SYNC", "BOOT", "OFF"})
@@ -33,9 +33,10 @@ MOST_PULSES: Final = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """One motion of two nodes: where they were at each pulse of either, and before the first.
+    """One motion of several nodes: where they were at pulses of any, and before the first.
 
-    ``points``: two rows, x and y. ``away``: the distance from the line, positive to its left.
+    ``points``: a row an axis. ``away``: the distance from the line; of two axes positive to its
+    left. At each pulse, or of very many at every second, third... and the last.
     """
 
     times: Times
@@ -49,35 +50,52 @@ class Path:
         return abs(float(self.away[place])), int(self.times[place])
 
 
-def paths(x: Track, y: Track, since: Ns, until: Ns) -> Iterator[Path]:
+def paths(tracks: Sequence[Track], since: Ns, until: Ns) -> Iterator[Path]:
     """Each motion in [since, until) in which a pulse was issued."""
-    for begin, end in _motions((x, y), since, until):
-        pulses = np.unique(np.concatenate([one.pulses(begin, end) for one in (x, y)]))
-        if not pulses.size:
-            continue
-        thinned = pulses[:: -(-pulses.size // MOST_PULSES)]
-        if thinned[-1] != pulses[-1]:
-            thinned = np.append(thinned, pulses[-1])
-        # Where they stood before the first pulse is the line's beginning.
-        times = np.concatenate([[thinned[0] - 1], thinned])
-        points = np.array([[one.steps(int(when)) for when in times] for one in (x, y)])
-        yield Path(times, points, off_line(points))
+    for begin, end in _motions(tracks, since, until):
+        path = _path(tracks, begin, end)
+        if path is not None:
+            yield path
+
+
+def last_path(tracks: Sequence[Track], until: Ns) -> Path | None:
+    """The last motion before ``until`` in which a pulse was issued; None if there was none."""
+    motions = list(_motions(tracks, 0, until))
+    found = (_path(tracks, begin, end) for begin, end in reversed(motions))
+    return next((path for path in found if path is not None), None)
 
 
 def off_line(points: Floats) -> Floats:
-    """How far each point of a plane lies off the line from the first to the last, left positive.
+    """How far each point lies off the line from the first to the last; in a plane, left positive.
 
     If these are the same, the distance from there.
     """
     away = points - points[:, :1]
     line = away[:, -1]
-    length = float(np.hypot(*line))
+    length = float(np.linalg.norm(line))
     if length == 0:
-        return np.asarray(np.hypot(*away))
-    return np.asarray((line[0] * away[1] - line[1] * away[0]) / length)
+        return np.asarray(np.linalg.norm(away, axis=0))
+    if len(points) == 2:
+        return np.asarray((line[0] * away[1] - line[1] * away[0]) / length)
+    along = (line @ away) / length
+    across = (away**2).sum(axis=0) - along**2
+    return np.asarray(np.sqrt(np.maximum(across, 0)))
 
 
-def _motions(tracks: tuple[Track, ...], since: Ns, until: Ns) -> Iterator[tuple[Ns, Ns]]:
+def _path(tracks: Sequence[Track], begin: Ns, end: Ns) -> Path | None:
+    pulses = np.unique(np.concatenate([one.pulses(begin, end) for one in tracks]))
+    if not pulses.size:
+        return None
+    thinned = pulses[:: -(-pulses.size // MOST_PULSES)]
+    if thinned[-1] != pulses[-1]:
+        thinned = np.append(thinned, pulses[-1])
+    # Where they stood before the first pulse is the line's beginning.
+    times = np.concatenate([[thinned[0] - 1], thinned])
+    points = np.array([[one.steps(int(when)) for when in times] for one in tracks])
+    return Path(times, points, off_line(points))
+
+
+def _motions(tracks: Sequence[Track], since: Ns, until: Ns) -> Iterator[tuple[Ns, Ns]]:
     """From when to when any of them did not rest; the last is cut off at ``until``."""
     changes = sorted(
         (when, number, state)

@@ -69,7 +69,7 @@ def draw_path(recording: Recording, file: BinaryIO, form: str, nodes: tuple[int,
     :class:`PictureError` for nodes that are not on one bus of it, or that did not move.
     """
     x, y = _pair(recording, nodes)
-    found = [_drawn(one) for one in paths(x, y, 0, recording.end + 1)]
+    found = [_drawn(one) for one in paths((x, y), 0, recording.end + 1)]
     if not found:
         raise PictureError(
             f"{recording.name}: neither of nodes {nodes[0]} and {nodes[1]} moved, "

@@ -41,7 +41,7 @@ __all__ = ["Recording", "RecordingError", "read"]
 Stored = Mapping[str, Any]
 
 #: What a line may lack, or have wrong, that is no recording's.
-_WRONG: Final = (LookupError, TypeError, ValueError, AttributeError)
+_WRONG: Final = (LookupError, TypeError, ValueError, AttributeError, RecursionError)
 
 
 class RecordingError(ValueError):
@@ -209,7 +209,10 @@ class _Reader:
     def record(self, stored: Stored) -> Record | None:
         """One line's; None for one that is no record by itself."""
         maker = self._makers.get(stored["is"])
-        return None if maker is None else maker(stored)
+        record = None if maker is None else maker(stored)
+        if record is not None:
+            _check(record, len(self._buses))
+        return record
 
     def _sent(self, stored: Stored) -> Sent:
         data = bytes.fromhex(stored["data"])
@@ -239,6 +242,18 @@ class _Reader:
         bus, node, when = stored["bus"], stored["node"], stored["t"]
         shape = self._shapes[stored["shape"]]
         return Moved(when, bus, node, self._kinds[bus, node].segment(when, shape, stored))
+
+
+def _check(record: Record, buses: int) -> None:
+    """TypeError or ValueError where what every reader relies on is of another kind, or nowhere."""
+    if type(record.when) is not int or type(record.bus) is not int:
+        raise TypeError(record.when, record.bus)
+    if record.when < 0 or not 0 <= record.bus < buses:
+        raise ValueError(record.when, record.bus)
+    if type(record) is Sent and not (
+        type(record.start) is type(record.end) is int and isinstance(record.sender, int | str)
+    ):
+        raise TypeError(record.start, record.end, record.sender)
 
 
 def _told(stored: Stored) -> Told:

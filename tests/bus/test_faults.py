@@ -248,6 +248,25 @@ WRONG: list[tuple[Mapping[str, object], str]] = [
         "fault 'latency.link': expected the name of a link, or true for all of them, got 3",
     ),
     ({"noise_bursts": 0}, "fault 'noise_bursts': expected more than 0 bursts per second, got 0"),
+    *(
+        (
+            {"noise_bursts": rate},
+            f"fault 'noise_bursts': expected 1e-06 to 1000000 bursts per second, got {rate!r}",
+        )
+        for rate in (float("inf"), 1e-300)
+    ),
+    (
+        {"noise_bursts": {"per_second": 1, "bytes": 3_000_000_000}},
+        "fault 'noise_bursts': expected 65536 bytes a burst at most, got 3000000000",
+    ),
+    (
+        {"latency": {"by": "0.5 ns"}},
+        "fault 'latency.by': expected a time in whole ns, got '0.5 ns'",
+    ),
+    (
+        {"latency": {"by": "9" * 13 + "s"}},
+        "fault 'latency.by': expected a time with its unit such as \"16 ms\", got '9999999999999s'",
+    ),
     (
         {"noise_bursts": {"per_second": 1, "bytes": 0}},
         "fault 'noise_bursts': expected 1 or more bytes a burst, got 0",

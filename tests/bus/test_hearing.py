@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from nodes.sac import SacSettings
+from nodes.sac.node import SacNode
 from sacbus.bus import (
     EVERY_LINK,
     Babble,
     BitErrors,
+    Bus,
     Cut,
     Dead,
     Echo,
@@ -15,14 +18,16 @@ from sacbus.bus import (
     LateDirection,
     Latency,
     LivePort,
+    NoiseBursts,
     Passage,
     Port,
     Transmission,
     WrongBaud,
 )
-from sacbus.kernel import MS, SECOND, Ns
+from sacbus.kernel import MS, SECOND, Kernel, Ns
 from sacbus.node import Heard
 from sacbus.wire import GENERAL_CALL, MOTHER, ack
+from tests.bus.test_bus import Everybody
 from tests.nodes.sac.bench import Bench, packet
 
 MOVE, MOVED = "m200v900a1d1", 200
@@ -137,6 +142,35 @@ def test_a_node_at_another_rate_obeys_nothing_and_disturbs_nobody_who_waits_for_
     assert heard != seen[0].data
     assert heard
     assert passage(seen[0]).heard_by(11, 0) == seen[0].data
+
+
+class Listening(SacNode):
+    """A SAC that keeps what it hears."""
+
+    __slots__ = ("heard",)
+
+    def hear(self, heard: Heard, now: Ns) -> None:
+        self.heard = getattr(self, "heard", b"") + heard.data
+        super().hear(heard, now)
+
+
+def test_what_is_told_that_a_node_heard_at_its_rate_is_what_came_to_it_through_collisions() -> None:
+    kernel, seen = Kernel(), list[Transmission]()
+    bus = Bus(kernel, Everybody())
+    node = Listening(11, SacSettings(), bus.rate, bus.tell)
+    bus.add(node)
+    medium = bus.medium
+    medium.watchers.append(seen.append)
+    medium.add_fault(WrongBaud(11, 9_600))
+    medium.add_fault(NoiseBursts(60, 4))
+    port = Port(medium, lambda _heard, _now: None)
+    for number in range(400):
+        kernel.at(number * 50 * MS, port.talk, packet(MOVE, GENERAL_CALL))
+    kernel.run_until(21 * SECOND)
+    told = [passage(sent).heard_by(11, medium.seed) for sent in seen if sent.sender is not node]
+    # Where they overlap, one's bytes are heard between another's.
+    assert sorted(node.heard) == sorted(b"".join(told))
+    assert medium.counters().collided > 20
 
 
 def test_a_node_whose_rate_is_a_little_off_gets_by() -> None:

@@ -232,6 +232,18 @@ def test_warnings_are_counted_and_the_last_are_shown(file: Path) -> None:
     assert "node 10: warning" in failure.states[0]
 
 
+@pytest.mark.parametrize("line", ["10hello", "10m400q9z"])
+def test_a_line_that_a_node_refuses_counts_as_a_warning(file: Path, line: str) -> None:
+    text = f"""
+        [[step]]
+        send = "{line}"
+        [[step]]
+        expect = {{ warnings = 0, within = "1 s" }}
+        """
+    (failure,) = played(file, text).failures
+    assert "node 10: refused" in failure.states[0]
+
+
 # ---- motion -------------------------------------------------------------------------------------
 
 

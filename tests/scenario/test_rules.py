@@ -15,6 +15,7 @@ from sacbus.scenario import (
     Disturb,
     NodeIs,
     PacketSeen,
+    Pause,
     Pin,
     Power,
     Raw,
@@ -102,3 +103,32 @@ def test_two_buses_are_no_line() -> None:
     two = (BUS, Configuration(name="b"))
     with pytest.raises(ConfigError, match="expected one bus to play on a link, got 2"):
         refuse(Scenario("x", two, ()), line_only=True)
+
+
+def test_what_names_nothing_is_refused() -> None:
+    assert refusals(Send(()), NodeIs(()), Type((10,), "\u20ac")) == [
+        "steps[0].send: expected one line at least, got none, 'x', give one",
+        "steps[1].expect: expected one node at least, got none, 'x', name one",
+        "steps[2].type: expected characters of one byte, got '\u20ac', 'x', correct it",
+    ]
+
+
+def test_two_buses_of_one_name_are_refused() -> None:
+    with pytest.raises(ConfigError, match="a name of its own for each, got 'bus' twice"):
+        run(Scenario("x", (BUS, Configuration(nodes=(12,))), ()))
+
+
+def test_a_circle_is_told_of_those_in_it_and_of_nobody_who_waits_for_them() -> None:
+    names = [f"s{number}" for number in range(3_000)]
+    steps = [
+        Step(Pause(), name=name, after=names[(number + 1) % 3_000])
+        for number, name in enumerate(names)
+    ]
+    assert len(refusals(*steps)) == 3_000
+    told = refusals(
+        Step(Pause(), name="a", after="b"),
+        Step(Pause(), name="b", after="a"),
+        Step(Pause(), after="a"),
+        Step(Pause(), after="none"),
+    )
+    assert [line.split(":")[0] for line in told] == [f"steps[{index}].after" for index in (0, 1, 3)]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from io import BytesIO
 
 import pytest
 
 from sacbus.daemon import Configuration, HostedBus
 from sacbus.kernel import MS, US
 from sacbus.mother import Mother
-from sacbus.trace import Recorder, Recording
+from sacbus.trace import Recorder, Recording, read
 from sacbus.trace.difference import Difference, differences
 from tests.trace.rig import Play, recorded, two_axes
 
@@ -85,6 +86,41 @@ def test_other_nodes_or_buses_are_all_that_is_told(
 ) -> None:
     (found,) = differences(of("m100"), recorded(moving("m100"), configuration()))
     assert (found.what, found.got) == (what, got)
+
+
+@pytest.mark.parametrize("lines", [0, -1, -20])
+def test_one_that_was_cut_off_is_not_the_same_as_a_whole_one(lines: int) -> None:
+    sink = BytesIO()
+    whole = recorded(two_axes, sink=sink)
+    written = sink.getvalue().splitlines(keepends=True)
+    less = b"".join(written[:lines]) if lines else sink.getvalue()[:-5]
+    for pair in ((whole, read(BytesIO(less))), (read(BytesIO(less)), whole)):
+        found = [one for one in differences(*pair) if one.what == "its end"]
+        assert {found[0].expected, found[0].got} == {"closed", "cut off"}
+        assert len(found) == 1
+
+
+def test_a_node_that_tells_nothing_is_not_the_same_as_one_that_does() -> None:
+    sink = BytesIO()
+    whole = recorded(two_axes, sink=sink)
+    kept = [line for line in sink.getvalue().splitlines(keepends=True) if b'"moves"' not in line]
+    found = differences(whole, read(BytesIO(b"".join(kept))))
+    assert [(one.node, one.what, one.got) for one in found if one.what == "motion"] == [
+        (10, "motion", "nothing"),
+        (11, "motion", "nothing"),
+    ]
+
+
+def test_one_that_goes_on_longer_is_told_where_all_else_is_the_same() -> None:
+    async def longer(bus: HostedBus, mother: Mother, recorder: Recorder) -> None:
+        await moving("m100")(bus, mother, recorder)
+        await asyncio.sleep(1)
+
+    configuration = Configuration(nodes=(10, 11))
+    shorter, other = of("m100"), recorded(longer, configuration)
+    (found,) = differences(shorter, other)
+    assert found.what == "its end"
+    assert not differences(shorter, other, within=1_001 * MS)
 
 
 def test_a_difference_reads_as_a_line() -> None:

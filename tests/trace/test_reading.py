@@ -124,3 +124,20 @@ def test_a_line_that_is_none_is_named(written: bytes, line: bytes) -> None:
 def test_a_node_that_is_not_in_it_is_named(written: bytes) -> None:
     with pytest.raises(KeyError, match="no node 99 on bus 0"):
         read(BytesIO(written)).track(99)
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        b"[" * 100_000,
+        b'{"is":"end","t":"x","bus":0}',
+        b'{"is":"end","t":-1,"bus":0}',
+        b'{"is":"end","t":1,"bus":7}',
+        b'{"is":"sent","t":1,"bus":0,"start":0,"lane":0,"from":[],"data":"00"}',
+    ],
+)
+def test_a_line_that_is_damaged_is_one_line_to_the_user(written: bytes, damaged: bytes) -> None:
+    head = written.splitlines(keepends=True)[0]
+    recording = read(BytesIO(head + damaged + b"\n"))
+    with pytest.raises(RecordingError, match=r"^the recording, line 2: expected a record, got "):
+        list(recording)
