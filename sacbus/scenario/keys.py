@@ -126,7 +126,7 @@ TOP: Final = (
         "seed",
         "a whole number",
         _whole(-(1 << 63), (1 << 63) - 1),
-        "for all that is left to chance on buses without a seed of their own",
+        "for what is left to chance on each [[bus]] here without a seed of its own",
         default=0,
     ),
     Key(

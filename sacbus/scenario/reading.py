@@ -154,7 +154,10 @@ class _CaseReader:
         )
 
     def _seeded(self, bus: Configuration, number: int | None) -> Configuration:
-        """A bus with the seed that counts: the caller's, its own, or the scenario's."""
+        """A bus with the seed that counts: the caller's, its own, or the scenario's.
+
+        Without a ``number`` it stands in a file of its own, which has the seed too.
+        """
         if self._seed is not None:
             return dataclasses.replace(bus, seed=self._seed)
         tables = self._top.get("bus")
