@@ -369,3 +369,19 @@ def test_ctrl_c_ends_a_long_one(file: Path) -> None:
             assert player.process.poll() is None
         assert player.send_signal(signal.SIGINT) == 130
         assert player.errors().strip() == "interrupted"
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_what_had_ended(file: Path, tmp_path: Path) -> None:
+    bus = "[[bus]]\n[[bus.nodes]]\naddress = 10\n[[step]]\n"
+    file.write_text(bus + 'send = "10m40"\n')
+    long = tmp_path / "long.toml"
+    long.write_text(bus + 'send = "10"\nevery = "1 ms"\nfor = "1000 h"\n')
+    results, page = tmp_path / "results.xml", tmp_path / "page.html"
+    command = ("run", str(file), str(long), "--junit", str(results), "--report", str(page))
+    with started(*command) as player:
+        player.read_until(lambda text: "passed " in text)
+        assert player.send_signal(signal.SIGINT) == 130
+    assert 'tests="1"' in results.read_text("utf-8")
+    assert long.name not in results.read_text("utf-8")
+    assert str(file) in page.read_text("utf-8")

@@ -154,26 +154,36 @@ def run_command(
     page = None if report is None else Report(report, parameters, _how(seed, real, link, speed))
     recorded = bool(kept) or (page is not None and link is None)
     results: list[Result] = []
-    for scenario in chosen:
-        with _Progress(scenario) as progress, _opened(record, recorded) as file:
-            result = _played(scenario, real, link, speed, file, progress.come_to)
-            if result.recording is not None:
-                _export(result.recording, vcd, pcap)
-                if picture is not None:
-                    _draw(result, result.recording, picture, form)
-            if page is not None:
-                page.add(result)
-        results.append(result)
-        if not as_json:
-            _tell(result)
-        if first and not result.passed:
-            break
-    if as_json:
-        click.echo(json.dumps({"scenarios": [one.as_json() for one in results]}))
-    if junit is not None:
-        junit.write(in_junit(results))
-    if page is not None:
-        page.write()
+
+    def write() -> None:
+        if as_json:
+            click.echo(json.dumps({"scenarios": [one.as_json() for one in results]}))
+        if junit is not None:
+            junit.write(in_junit(results))
+        if page is not None:
+            page.write()
+
+    try:
+        for scenario in chosen:
+            with _Progress(scenario) as progress, _opened(record, recorded) as file:
+                result = _played(scenario, real, link, speed, file, progress.come_to)
+                if result.recording is not None:
+                    _export(result.recording, vcd, pcap)
+                    if picture is not None:
+                        _draw(result, result.recording, picture, form)
+                if page is not None:
+                    page.add(result)
+            results.append(result)
+            if not as_json:
+                _tell(result)
+            if first and not result.passed:
+                break
+    except KeyboardInterrupt:
+        # What had ended is kept; the one that had not is in none of them.
+        if results:
+            write()
+        raise
+    write()
     return 0 if all(one.passed for one in results) else 1
 
 
