@@ -11,9 +11,11 @@ from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
 
+import click
 import pytest
 
 from sacbus.cli import run
+from sacbus.cli.recordings import span
 from sacbus.mother import safe_body
 from sacbus.trace import read
 from sacbus.trace.records import Moved, Sent
@@ -286,3 +288,12 @@ def test_without_matplotlib_one_line_says_what_to_install(
     out, err = capsys.readouterr()
     assert (out, err.count("\n")) == ("", 1)
     assert err.endswith("install it: python -m pip install 'sacbus[plot]'\n")
+
+
+@pytest.mark.parametrize(("given", "ns"), [("1.5us", 1_500), ("0.000000001 s", 1), ("0", 0)])
+def test_a_time_is_whole_ns(given: str, ns: int) -> None:
+    option = click.Option(["--time"])
+    context = click.Context(click.Command("diff"))
+    assert span(context, option, given) == ns
+    with pytest.raises(click.BadParameter, match=r"expected whole ns, got '0\.5ns'"):
+        span(context, option, "0.5ns")

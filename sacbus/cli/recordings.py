@@ -41,7 +41,10 @@ def span(_ctx: click.Context, _param: click.Parameter, given: str) -> int:
         raise click.BadParameter(f"expected a time such as 1us, 10ms or 2s, got {given!r}")
     whole, fraction, unit = found[1], found[2] or "", found[3]
     factor = _UNITS[unit]
-    return int(whole) * factor + int(fraction or 0) * factor // int("1" + "0" * len(fraction))
+    part, beyond = divmod(int(fraction or 0) * factor, int("1" + "0" * len(fraction)))
+    if beyond:
+        raise click.BadParameter(f"expected whole ns, got {given!r}")
+    return int(whole) * factor + part
 
 
 def opened(path: str) -> Recording:
