@@ -48,30 +48,30 @@ def test_texts_are_written_in_order_and_all_of_them_before_it_closes() -> None:
 
 def test_what_a_reader_does_not_take_is_missed_and_counted_and_saying_it_never_waits() -> None:
     line = "x" * 1_000 + "\n"
+    said = WAITING + 500  # a pipe holds some 64 of these
     read: list[bytes] = []
 
     def read_to_the_end(pipe: int) -> None:
-        while b"end\n" not in b"".join(read[-2:]):
+        while not (read and read[-1].endswith(b"end\n")):
             read.append(os.read(pipe, 65_536))
 
-    async def scene(pipe: int) -> str:
+    async def scene(pipe: int) -> None:
         writer = Writer(lambda fault: pytest.fail(repr(fault)), missed)
-        for _ in range(WAITING + 500):  # a pipe holds some 64 of these
-            writer.say(line)
-        threading.Thread(target=read_to_the_end, args=(pipe,), daemon=True).start()
-        async with asyncio.timeout(30):
-            while b"end\n" not in (text := b"".join(read)):
-                writer.say("end\n")
-                await asyncio.sleep(0)
+        taken = sum(writer.say(line) for _ in range(said))
+        assert WAITING <= taken < said
+        reader = threading.Thread(target=read_to_the_end, args=(pipe,), daemon=True)
+        reader.start()
+        async with asyncio.timeout(60):
+            await writer.room()
+        assert writer.say("end\n")
         writer.close()
-        return text.decode()
+        reader.join(60)
 
     with piped() as pipe:
-        text = asyncio.run(scene(pipe))
-    counted = sum(int(one) for one in re.findall(r"<(\d+) missed>", text))
-    assert counted > 0
-    # Every line was written or counted (and so may have been some of the ends).
-    assert text.count(line) + counted >= WAITING + 500
+        asyncio.run(scene(pipe))
+    text = b"".join(read).decode()
+    [counted] = re.findall(r"<(\d+) missed>\n", text)
+    assert text == line * (said - int(counted)) + missed(int(counted)) + "end\n"
 
 
 def test_who_can_wait_for_room_misses_nothing_however_slow_the_reader() -> None:
