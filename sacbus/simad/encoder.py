@@ -7,7 +7,7 @@ to the result. Which step comes when is ``order.py``'s and ``schedule.py``'s.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from sacbus.simad.edges import HIGH, LOW, Edges, joined_edges
 from sacbus.simad.fault import DelayTooLong, SimadError
-from sacbus.simad.order import first_direction, stretches
+from sacbus.simad.order import first_direction, stretches, taking_order
 from sacbus.simad.report import Report, Tally
 from sacbus.simad.report import report as report_of
 from sacbus.simad.schedule import Progress
@@ -24,7 +24,8 @@ from sacbus.simad.steps import MOST_AXES, Steps, joined
 from sacbus.simad.timing import GECKO, Timing
 
 if TYPE_CHECKING:
-    from sacbus.simad.steps import Times
+    from sacbus.simad.order import Flags
+    from sacbus.simad.steps import Axes, Times
 
 __all__ = ["MAX_DELAY", "Encoded", "Encoder", "Encoding", "encode"]
 
@@ -65,12 +66,8 @@ def encode(
     40 bytes a step for the result, and as much again while it is put together.
     """
     encoder = Encoder(axes, timing, max_delay, names)
-    parts = [*map(encoder.take, steps.pieces(1 << 20)), encoder.close()]
-    return Encoding(
-        joined_edges([one.edges for one in parts]),
-        np.concatenate([one.falls for one in parts]),
-        encoder.report,
-    )
+    parts = [*encoder.taken(steps), encoder.close()]
+    return Encoding(*_together(parts), encoder.report)
 
 
 class Encoder:
@@ -124,26 +121,30 @@ class Encoder:
         ``falls`` are of the steps that were given longest ago. DelayTooLong for a step that cannot
         fall in time, SimadError for what follows on no step before: the encoder is of no use then.
         """
-        steps.check()
+        return _together([*self.taken(steps)])
+
+    def taken(self, steps: Steps) -> Iterator[Encoded]:
+        """The same, in pieces of some ten thousand steps."""
         self._check(steps)
         if not steps.count:
-            return Encoded(self._sorter.until(0), steps.times)
+            return
+        # The last instant may get company, and what was held belongs to the first or before it.
         last = int(steps.times[-1])
-        # The last instant waits for company; before it, what was held joins what it belongs to.
         certain = int(np.searchsorted(steps.times, last))
-        if not certain and self._held and self._held[0].times[0] == last:
+        held = joined([*self._held, steps.slice(0, certain)])
+        if held.count and held.times[0] == last:
             self._held.append(steps)
-            return Encoded(self._sorter.until(0), steps.times[:0])
-        ready = joined([*self._held, steps.slice(0, certain)])
+            return
         self._held = [steps.slice(certain, steps.count)]
-        return self._taken(ready, last)
+        yield from self._pieces(held, last)
 
     def close(self) -> Encoded:
         """The rest, once no more steps come."""
-        ready, self._held = joined(self._held), []
-        return self._taken(ready, None)
+        rest, self._held = joined(self._held), []
+        return _together([*self._pieces(rest, None)])
 
     def _check(self, steps: Steps) -> None:
+        steps.check()
         if not steps.count:
             return
         highest = int(steps.axes.max())
@@ -154,22 +155,20 @@ class Encoder:
                 f"expected steps from {self._held[0].times[0]} ns on, got {steps.times[0]} ns"
             )
 
-    def _taken(self, steps: Steps, until: int | None) -> Encoded:
+    def _pieces(self, steps: Steps, until: int | None) -> Iterator[Encoded]:
         """Take steps; the edges before ``until``, where the next step may fall, or all."""
-        parts, falls = [], []
         begin = 0
         while begin < steps.count:
             end = min(begin + PIECE, steps.count)
             if end < steps.count:
                 # All of an instant together.
                 end = int(np.searchsorted(steps.times, steps.times[end - 1], side="right"))
-            falls.append(self._schedule(steps.slice(begin, end)))
+            falls = self._schedule(steps.slice(begin, end))
             following = int(steps.times[end]) if end < steps.count else until
-            parts.append(self._sorter.until(following))
+            yield Encoded(self._sorter.until(following), falls)
             begin = end
-        parts.append(self._sorter.until(until))
-        every = np.concatenate(falls) if falls else steps.times[:0]
-        return Encoded(joined_edges(parts), every)
+        if not steps.count:
+            yield Encoded(self._sorter.until(until), steps.times)
 
     def _schedule(self, steps: Steps) -> Times:
         """When some steps fall, all of an instant among them; their edges go to be sorted."""
@@ -177,38 +176,47 @@ class Encoder:
         if self._now is None:
             self._now = first_direction(times, axes, clockwise)
             self._sorter.direction = HIGH if self._now else LOW
+        place = taking_order(times, axes, clockwise, self._now)
+        if place is not None:
+            times, axes, clockwise = times[place], axes[place], clockwise[place]
         by_axis = np.argsort(axes, kind="stable")
-        numbers, place = stretches(times, axes, clockwise, by_axis, self._now)
-        if place is None:
-            falls, turns = self._progress.take(times, axes, numbers, by_axis)
-        else:
-            which = axes[place]
-            taken, turns = self._progress.take(
-                times[place], which, numbers[place], np.argsort(which, kind="stable")
-            )
-            falls = np.empty_like(taken)
-            falls[place] = taken
-        self._count(steps, falls, by_axis)
+        numbers = stretches(clockwise, self._now)
+        falls, turns = self._progress.take(times, axes, numbers, by_axis)
+        self._count(falls - times, times, axes, clockwise, by_axis)
         self._sorter.add_steps(falls, axes, self.timing.low)
         self._sorter.add_turns(turns, now=self._now)
         self._turns += turns.size
         self._now ^= bool(turns.size & 1)
-        return falls
+        if place is None:
+            return falls
+        as_given = np.empty_like(falls)
+        as_given[place] = falls
+        return as_given
 
-    def _count(self, steps: Steps, falls: Times, by_axis: Times) -> None:
-        delays = falls - steps.times
+    def _count(
+        self, delays: Times, times: Times, axes: Axes, clockwise: Flags, by_axis: Times
+    ) -> None:
+        """Add the delays of steps to the figures; DelayTooLong if one is."""
         if int(delays.max()) > self.max_delay:
             first = int(np.argmax(delays > self.max_delay))
             raise DelayTooLong(
-                self.names[int(steps.axes[first])],
-                int(steps.times[first]),
-                int(delays[first]),
-                self.max_delay,
+                self.names[axes[first]], int(times[first]), int(delays[first]), self.max_delay
             )
         begin = 0
-        late, signs = delays[by_axis], steps.directions[by_axis]
-        for axis, count in enumerate(np.bincount(steps.axes, minlength=self.axes).tolist()):
+        late, way = delays[by_axis], clockwise[by_axis]
+        for axis, count in enumerate(np.bincount(axes, minlength=self.axes).tolist()):
             if count:
                 end = begin + count
-                self._tallies[axis].add(late[begin:end], signs[begin:end])
+                self._tallies[axis].add(late[begin:end], way[begin:end])
                 begin = end
+
+
+def _together(parts: list[Encoded]) -> Encoded:
+    """One of several that follow one another."""
+    if len(parts) == 1:
+        return parts[0]
+    falls = [one.falls for one in parts]
+    return Encoded(
+        joined_edges([one.edges for one in parts]),
+        np.concatenate(falls) if falls else np.empty(0, dtype=np.int64),
+    )

@@ -15,7 +15,8 @@ import numpy as np
 from sacbus.simad.timing import GECKO, Timing, highest_rate
 
 if TYPE_CHECKING:
-    from sacbus.simad.steps import Signs, Times
+    from sacbus.simad.order import Flags
+    from sacbus.simad.steps import Times
 
 __all__ = ["AxisReport", "Report", "Tally"]
 
@@ -115,10 +116,10 @@ class Tally:
         self.sum = 0
         self.sum_of_squares = 0
 
-    def add(self, delays: Times, directions: Signs) -> None:
+    def add(self, delays: Times, clockwise: Flags) -> None:
         """Some steps, at least one, :data:`PIECE` at most."""
         self.steps += delays.size
-        self.position += int(directions.sum(dtype=np.int64))
+        self.position += 2 * int(np.count_nonzero(clockwise)) - delays.size
         worst = int(delays.max())
         if not worst:
             return
