@@ -8,7 +8,7 @@ import platform
 from collections.abc import Callable
 from dataclasses import asdict
 
-from benchmarks import bus, kernel, lateness, line, motion, pty, recording, tcp, wire
+from benchmarks import bus, kernel, lateness, line, motion, pty, recording, simad, tcp, wire
 from benchmarks.figure import Figure
 from sacbus.wire import CRC_IS_FAST
 
@@ -18,6 +18,7 @@ BENCHMARKS: dict[str, Callable[[int], list[Figure]]] = {
     "motion": motion.figures,
     "bus": bus.figures,
     "recording": recording.figures,
+    "simad": simad.figures,
     "line": line.figures,
     "pty": pty.figures,
     "tcp": tcp.figures,

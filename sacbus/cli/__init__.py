@@ -27,6 +27,7 @@ from sacbus.cli.queue import queue_group
 from sacbus.cli.run import run_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
+from sacbus.cli.simad import simad_group
 from sacbus.cli.terminal import terminal_command
 
 __all__ = ["root", "run"]
@@ -59,6 +60,7 @@ for command in (
     queue_group,
     export_command,
     diff_command,
+    simad_group,
     check_command,
     eeprom_group,
     kinds_command,

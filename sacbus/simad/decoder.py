@@ -21,22 +21,22 @@ __all__ = ["Decoder", "decode"]
 
 
 def decode(edges: Edges) -> Steps:
-    """The steps that these edges make, as :class:`Decoder`."""
+    """The steps that these edges make, as :class:`Decoder`; the step lines are high before them."""
     return Decoder(edges.direction).take(edges)
 
 
 class Decoder:
-    """Decodes edges as they come.
+    """Decodes edges as they come, all of an instant together.
 
     Of a DIR that changes at the very instant of a fall, which breaks its set-up time, the level is
     the one before it. SimadError for a step while DIR's level is unknown.
     """
 
-    def __init__(self, direction: int = HIGH) -> None:
-        """``direction``: DIR's level before the first edge; the step lines are high."""
+    def __init__(self, direction: int = HIGH, steps: int = HIGH) -> None:
+        """``direction``: DIR's level before the first edge; ``steps``: that of the step lines."""
         self._direction = direction
         #: The last level of each line, DIR's excepted.
-        self._levels = np.full(256, HIGH, dtype=np.uint8)
+        self._levels = np.full(256, steps, dtype=np.uint8)
 
     def take(self, edges: Edges) -> Steps:
         """The steps of more edges, no earlier than those before."""

@@ -93,7 +93,8 @@ def _of_mixed_instants(times: Times, clockwise: Flags) -> Numbers | None:
     high = np.searchsorted(times, instants, side="right")
     counts = high - low
     ends = np.cumsum(counts)
-    return np.arange(int(ends[-1])) + np.repeat(low - (ends - counts), counts)
+    places: Numbers = np.arange(int(ends[-1])) + np.repeat(low - (ends - counts), counts)
+    return places
 
 
 def _within_instants(instant: Numbers, axes: Axes, clockwise: Flags) -> tuple[Flags, Numbers]:

@@ -7,14 +7,14 @@ after the last fall of the stretch before:
     fall = max(due, fall before on the axis + period, ready of its stretch)
     ready of a stretch = last fall of the stretch before + turn
 
-That looks like a loop, but each part is a running maximum: of x[i] = max(a[i], x[i-1] + gap[i]) the
-solution is max(a - sum of gaps) so far, + sum of gaps. First each axis by itself; then the stretches,
-one after the other, of which only the last fall and the number of steps of the busiest axis count;
-then each step has its stretch's ready plus the periods of those before it. That is exact where a
-turn of DIR takes no less than a period, as Gecko's does (4.5 us both): then what an axis did before
-the turn is over. Where a period is longer, an axis may have to wait across the turn: the whole is
-then repeated with what was found, which only ever moves steps back, until nothing moves. Where too
-many such waits hang on one another, the rest is walked through step by step.
+That looks like a loop, but each part is a running maximum: x[i] = max(a[i], x[i-1] + gap[i]) is
+solved by the greatest (a - sum of gaps) so far, plus the sum of gaps. First each axis by itself;
+then the stretches, one after the other, of which only the last fall and the number of steps of the
+busiest axis count; then each step has its stretch's ready plus the periods of those before it.
+That is exact where a turn of DIR takes no less than a period, as Gecko's does (4.5 us both): what an
+axis did before the turn is over then. Where a period is longer, an axis may have to wait across the
+turn: the whole is then repeated with what was found, which only ever moves steps later, until
+nothing moves. Where too many such waits hang on one another, the steps are walked through instead.
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ class Progress:
         self.last = NEVER
         self.axes = [NEVER] * axes
 
-    def take(self, times: Times, axes: Axes, numbers: Numbers, by_axis: Numbers) -> tuple[Times, Times]:
+    def take(
+        self, times: Times, axes: Axes, numbers: Numbers, by_axis: Numbers
+    ) -> tuple[Times, Times]:
         """When steps fall that are due at ``times``, and when DIR turns before each new stretch.
 
         The steps in the order in which they are taken, at least one; ``numbers``: of their
@@ -153,7 +155,7 @@ class Progress:
 
 
 def _within(numbers: Numbers, spans: list[tuple[int, int]]) -> Numbers:
-    """For each step in the order of the axes, how many of its axis stand before it in its stretch."""
+    """For each step, by axes, how many of the same axis stand before it in its stretch."""
     begins = np.empty(numbers.size, dtype=np.bool_)
     np.not_equal(numbers[1:], numbers[:-1], out=begins[1:])
     for begin, end in spans:

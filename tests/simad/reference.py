@@ -80,9 +80,7 @@ def next_of(waiting: list[tuple[int, Due]], direction: int) -> tuple[int, Due]:
 
 def as_tuples(edges: Edges) -> list[Edge]:
     """The arrays as edges, one after the other."""
-    return list(
-        zip(edges.times.tolist(), edges.lines.tolist(), edges.levels.tolist(), strict=True)
-    )
+    return list(zip(edges.times.tolist(), edges.lines.tolist(), edges.levels.tolist(), strict=True))
 
 
 def broken_rules(edges: Iterable[Edge], timing: Timing) -> list[str]:
@@ -91,13 +89,13 @@ def broken_rules(edges: Iterable[Edge], timing: Timing) -> list[str]:
     level: dict[int, int] = {}
     since: dict[int, int] = {}
     last_fall: int | None = None
-    low = set()
+    low: set[int] = set()
     now = 0
     for when, line, to in edges:
         if when < now:
             broken.append(f"{when}: time runs backwards")
         now = when
-        if line in level and level[line] == to or line and line not in level and to == 1:
+        if to == level.get(line, 1 if line else None):
             broken.append(f"{when}: line {line} is {to} already")
         spent = when - since[line] if line in since else None
         if line == 0:

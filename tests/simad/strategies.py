@@ -18,9 +18,7 @@ def streams(draw: st.DrawFn, most: int = 60) -> list[Due]:
     """Steps of up to five axes in the order of time, several of one axis at an instant too."""
     axes = draw(st.integers(1, 5))
     steps = draw(
-        st.lists(
-            st.tuples(gaps, st.integers(0, axes - 1), st.sampled_from((1, -1))), max_size=most
-        )
+        st.lists(st.tuples(gaps, st.integers(0, axes - 1), st.sampled_from((1, -1))), max_size=most)
     )
     now = draw(st.integers(0, 10_000))
     found = []
