@@ -181,12 +181,7 @@ class _Lines:
 
     def parts(self) -> Iterator[Edges]:
         """The edges as they come."""
-        for steps in self._source.parts:
-            if self._kept is not None:
-                self._kept[0].append(steps)
-            for part in self._encoder.taken(steps):
-                yield self._driven(part)
-        yield self._driven(self._encoder.close())
+        yield from map(self._driven, self._encoder.all_of(self._given()))
 
     def run(self) -> None:
         """All of it, for whom the edges themselves are of no use, or are kept."""
@@ -208,6 +203,12 @@ class _Lines:
 
         assert self._kept is not None
         return joined(self._kept[0]), np.concatenate([part.falls for part in self._kept[1]])
+
+    def _given(self) -> Iterator[Steps]:
+        for steps in self._source.parts:
+            if self._kept is not None:
+                self._kept[0].append(steps)
+            yield steps
 
     def _driven(self, part: Encoded) -> Edges:
         from sacbus.simad import Decoder

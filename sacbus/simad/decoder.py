@@ -6,18 +6,21 @@ instant. Takes any edges, whoever made them, and in whatever pieces.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sacbus.simad.edges import DIR, HIGH, LOW, UNKNOWN, Edges
 from sacbus.simad.fault import SimadError
-from sacbus.simad.steps import Steps
+from sacbus.simad.steps import Steps, joined
 
 if TYPE_CHECKING:
     from sacbus.simad.edges import Bytes, Times
 
 __all__ = ["Decoder", "decode"]
+
+#: Edges that are worked on at a time: what fits into a processor's cache, and is worth the calls.
+PIECE: Final = 1 << 16
 
 
 def decode(edges: Edges) -> Steps:
@@ -40,7 +43,19 @@ class Decoder:
 
     def take(self, edges: Edges) -> Steps:
         """The steps of more edges, no earlier than those before."""
-        times, lines, levels = edges.times, edges.lines, edges.levels
+        parts = []
+        begin = 0
+        while begin < edges.count:
+            end = begin + PIECE
+            if end < edges.count:
+                # All of an instant together.
+                end = int(np.searchsorted(edges.times, edges.times[end - 1], side="right"))
+            piece = slice(begin, end)
+            parts.append(self._steps(edges.times[piece], edges.lines[piece], edges.levels[piece]))
+            begin = end
+        return joined(parts)
+
+    def _steps(self, times: Times, lines: Bytes, levels: Bytes) -> Steps:
         by_line = np.argsort(lines, kind="stable")
         falls = np.sort(by_line[self._falls(lines[by_line], levels[by_line])])
         when = times[falls]
@@ -54,7 +69,9 @@ class Decoder:
             )
         axes = lines[falls] - np.uint8(1)
         signs = np.where(directions == HIGH, 1, -1).astype(np.int8)
-        # At one instant by axis, as merge() has them.
+        # At one instant by axis, as merge() has them; mostly they are.
+        if not ((when[1:] == when[:-1]) & (axes[1:] < axes[:-1])).any():
+            return Steps(when, axes, signs)
         order = np.lexsort((axes, when))
         return Steps(when[order], axes[order], signs[order])
 
