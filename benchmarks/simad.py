@@ -29,7 +29,7 @@ def check(steps: Steps, coded: Encoding, decoded: Steps, axes: int) -> None:
         told = coded.report.axes[axis]
         late = times - steps.times[mine]
         assert late.min() >= 0
-        assert (told.delay_max, told.moved) == (late.max(), np.count_nonzero(late))
+        assert (told.delay_max, told.moved) == (int(late.max()), int(np.count_nonzero(late)))
 
 
 def figures(rounds: int) -> list[Figure]:

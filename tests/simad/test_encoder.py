@@ -37,6 +37,7 @@ def encoded(steps: list[Due], timing: Timing | None = None, axes: int = 5) -> En
     return encode(stream(steps), axes, timing or Timing(), ANY)
 
 
+@pytest.mark.slow
 @settings(max_examples=1_000)
 @given(streams(), timings())
 def test_it_is_what_one_step_after_the_other_gives(steps: list[Due], timing: Timing) -> None:
@@ -49,7 +50,8 @@ def test_it_is_what_one_step_after_the_other_gives(steps: list[Due], timing: Tim
         assert fast.edges.direction == slow.direction
 
 
-@settings(max_examples=300)
+@pytest.mark.slow
+@settings(max_examples=100)
 @given(streams(), timings())
 def test_every_edge_keeps_the_rules_and_no_step_is_lost(steps: list[Due], timing: Timing) -> None:
     fast = encoded(steps, timing)
@@ -64,7 +66,8 @@ def test_every_edge_keeps_the_rules_and_no_step_is_lost(steps: list[Due], timing
     assert sorted(made) == sorted((when, *what) for when, what in fallen)
 
 
-@settings(max_examples=300)
+@pytest.mark.slow
+@settings(max_examples=100)
 @given(streams(), timings())
 def test_what_is_told_of_delays_is_true(steps: list[Due], timing: Timing) -> None:
     fast = encoded(steps, timing)
@@ -81,7 +84,8 @@ def test_what_is_told_of_delays_is_true(steps: list[Due], timing: Timing) -> Non
         assert told.position == sum(way for _, which, way in steps if which == axis)
 
 
-@settings(max_examples=300)
+@pytest.mark.slow
+@settings(max_examples=100)
 @given(streams(), timings(), st.data())
 def test_pieces_make_no_difference(steps: list[Due], timing: Timing, data: st.DataObject) -> None:
     whole = encoded(steps, timing)
@@ -97,7 +101,8 @@ def test_pieces_make_no_difference(steps: list[Due], timing: Timing, data: st.Da
     assert encoder.report == whole.report
 
 
-@settings(max_examples=300)
+@pytest.mark.slow
+@settings(max_examples=100)
 @given(streams(), timings(), st.integers(1, 7))
 def test_neither_do_the_pieces_that_it_works_in(
     steps: list[Due], timing: Timing, piece: int
@@ -114,7 +119,8 @@ def test_neither_do_the_pieces_that_it_works_in(
     assert many.report == whole.report
 
 
-@settings(max_examples=200)
+@pytest.mark.slow
+@settings(max_examples=100)
 @given(streams())
 def test_decoding_gives_the_steps_again(steps: list[Due]) -> None:
     fast = encoded(steps)
