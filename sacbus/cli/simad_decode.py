@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, Final
 
@@ -24,7 +25,7 @@ STANDARD: Final = "-"
 
 
 @click.command("decode")
-@click.argument("file", type=click.File("rb"), metavar="FILE.vcd")
+@click.argument("place", metavar="FILE.vcd")
 @click.option("--dir", "direction", default="", metavar="NAME", help="The wire that DIR is.")
 @click.option(
     "--steps",
@@ -47,7 +48,7 @@ STANDARD: Final = "-"
 @click.option("--json", "as_json", is_flag=True, help="Print the axes as JSON.")
 @verbose
 def decode_command(
-    file: BinaryIO,
+    place: str,
     direction: str,
     steps: str,
     table: str | None,
@@ -71,30 +72,45 @@ def decode_command(
     if table == STANDARD and as_json:
         raise click.UsageError("--csv: expected a file together with --json, got -")
     outputs = {"--csv": None if table == STANDARD else table, "--npy": npy}
-    refuse_shared_files(outputs, [file.name] if file.name not in {STANDARD, "<stdin>"} else [])
+    refuse_shared_files(outputs, [place] if place != STANDARD else [])
     refuse_missing_directories(outputs)
     chosen = tuple(one.strip() for one in steps.split(",")) if steps else ()
     try:
-        wires, parts = read_dump(file, direction, chosen)
-        decoder = Decoder(UNKNOWN, UNKNOWN)
-        found = _Found(map(decoder.take, parts), wires.axes, keep=npy is not None)
-        if table == STANDARD:
-            found.write(sys.stdout)
-        elif table is not None:
-            with fresh_text(Path(table)) as out:
-                found.write(out)
-        else:
-            found.run()
-        if npy is not None:
-            found.save(npy)
+        with _opened(place) as file:
+            wires, parts = read_dump(file, direction, chosen)
+            decoder = Decoder(UNKNOWN, UNKNOWN)
+            found = _Found(map(decoder.take, parts), wires.axes, keep=npy is not None)
+            if table == STANDARD:
+                found.write(sys.stdout)
+            elif table is not None:
+                with fresh_text(Path(table)) as out:
+                    found.write(out)
+            else:
+                found.run()
     except SimadError as fault:
-        raise WrongInput(f"{file.name}: {fault}") from fault
+        raise WrongInput(f"{place}: {fault}") from fault
+    if npy is not None:
+        found.save(npy)
     if as_json:
         click.echo(json.dumps(found.as_json()))
     elif table != STANDARD:
         for one in found.as_json()["axes"]:
             click.echo(f"axis {one['axis']}: {one['steps']} steps to {one['position']}")
     return 0
+
+
+@contextmanager
+def _opened(place: str) -> Iterator[BinaryIO]:
+    """A file, or standard input."""
+    if place == STANDARD:
+        yield sys.stdin.buffer
+        return
+    with ExitStack() as stack:
+        try:
+            file = stack.enter_context(Path(place).open("rb"))
+        except OSError as fault:
+            raise WrongInput(f"{place}: {fault.strerror}, name a value change dump") from fault
+        yield file
 
 
 class _Found:

@@ -24,10 +24,10 @@ from sacbus.fresh import fresh_file
 if TYPE_CHECKING:
     from sacbus.simad import Edges, Encoded, Encoder, Report, Steps
 
-__all__ = ["encode_command"]
+__all__ = ["RULES", "encode_command"]
 
 #: The defaults of these options, for their help; a test holds them to those of the room.
-_RULES: Final = (
+RULES: Final = (
     ("low", "500ns", "How long a step line is low for a step."),
     ("high", "4us", "How long it is high before the next step, at least."),
     ("setup", "4us", "How long DIR is set before a step, at least."),
@@ -42,7 +42,7 @@ class Infeasible(click.ClickException):
 
 
 def _rules(command: Any) -> Any:  # noqa: ANN401 (click's decorators)
-    for name, default, told in reversed(_RULES):
+    for name, default, told in reversed(RULES):
         command = click.option(
             f"--{name}",
             callback=span,

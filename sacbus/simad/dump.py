@@ -128,7 +128,7 @@ def read_dump(
 
     ``direction`` and ``steps``: the wires' names, in full or the last word of it. Without them
     those of a scope with a ``dir`` and with wires that begin with ``step``. What a wire is at first
-    is an edge too, from a level that is not known: so is DIR's before the first. SimadError for
+    is an edge too, from a level that is not known, a tick before the file begins. SimadError for
     what is no such file.
     """
     words = _words(file)
@@ -163,7 +163,7 @@ def _head(words: Iterator[str]) -> tuple[int, dict[str, str]]:
                 raise SimadError("expected a $timescale before $enddefinitions, got none")
             return tick, known
         if not word.startswith("$"):
-            break
+            continue  # sigrok-cli writes its sample rate before the dump
         told = _until_end(words)
         match word, told:
             case "$timescale", _:
@@ -237,11 +237,12 @@ def _edges(words: Iterator[str], codes: Sequence[str], tick: int) -> Iterator[Ed
     find = changes.get
     ticks: list[int] = []
     which: list[int] = []
-    direction, now = UNKNOWN, 0
+    direction, now, at_first = UNKNOWN, 0, 0
     for word in words:
         change = find(word)
         if change is not None:
-            ticks.append(now)
+            # What the file begins with has been so before: a line that falls at once does fall.
+            ticks.append(now - at_first)
             which.append(change)
         elif word[0] == "#":
             if len(ticks) >= PIECE:
@@ -254,6 +255,8 @@ def _edges(words: Iterator[str], codes: Sequence[str], tick: int) -> Iterator[Ed
             next(words, "")  # a value of several bits, and whose it is
         elif word == "$comment":
             _until_end(words)
+        elif word in {"$dumpvars", "$end"}:
+            at_first = int(word == "$dumpvars" and not ticks and direction == UNKNOWN)
         # Else a value of another wire, or a keyword about values, which follow as any others.
     if ticks:
         yield _part(ticks, which, tick, direction)

@@ -11,9 +11,9 @@ That looks like a loop, but each part is a running maximum: x[i] = max(a[i], x[i
 solved by the greatest (a - sum of gaps) so far, plus the sum of gaps. First each axis by itself;
 then the stretches, one after the other, of which only the last fall and the number of steps of the
 busiest axis count; then each step has its stretch's ready plus the periods of those before it.
-That is exact where a turn of DIR takes no less than a period, as Gecko's does (4.5 us both): what an
-axis did before the turn is over then. Where a period is longer, an axis may have to wait across the
-turn: the whole is then repeated with what was found, which only ever moves steps later, until
+That is exact where a turn of DIR takes no less than a period, as Gecko's does (4.5 us both): what
+an axis did before the turn is over then. Where a period is longer, an axis may have to wait across
+the turn: the whole is then repeated with what was found, which only ever moves steps later, until
 nothing moves. Where too many such waits hang on one another, the steps are walked through instead.
 """
 

@@ -33,7 +33,7 @@ _STORED: Final = np.dtype([("time_ns", "<i8"), ("axis", "<i4"), ("direction", "i
 
 
 class _Columns(NamedTuple):
-    """Some lines of a file: three arrays of int64, and the number of the first, from 1."""
+    """Some lines of a file: three arrays of int64, and the number of the first, a line or a row."""
 
     times: Times
     axes: Times

@@ -66,8 +66,8 @@ def highest_rate(timing: Timing = GECKO, directions: int = 1) -> float:
 
     ``directions``: how many stretches of one direction there are while each axis steps once. One
     where all go the same way (Gecko: 222 222 steps/s), two where some go the other way (111 111):
-    those of one direction step together. More where steps come in such an order that there is no
-    together, as of four axes that go to and fro by turns: 55 555.
+    those of one direction step together. More where steps come in an order that keeps them apart,
+    as four axes do that step by turns, each the other way than the one before: 55 555.
     """
     if directions < 1:
         raise SimadError(f"expected 1 direction or more, got {directions}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -76,7 +78,7 @@ def test_pieces_make_no_difference(seed: int, axes: int, places: list[int]) -> N
     cuts = [0, *sorted(min(place, every.count) for place in places), every.count]
     parts = [
         decoder.take(Edges(every.times[a:b], every.lines[a:b], every.levels[a:b]))
-        for a, b in zip(cuts, cuts[1:], strict=False)
+        for a, b in pairwise(cuts)
     ]
     again = joined(parts)
     order = np.lexsort((again.axes, again.times))

@@ -184,7 +184,7 @@ def test_of_one_instant_those_that_dir_fits_are_first_and_then_the_axes_decide()
 
 
 def test_steps_of_one_axis_never_change_their_order() -> None:
-    # Single pulses of one instant, to and fro: axis 1 goes with the second of axis 0.
+    # Single pulses of one instant, one way and the other: axis 1 goes with the second of axis 0.
     steps = [(0, 0, 1), (0, 0, -1), (0, 0, 1), (0, 1, -1)]
     assert falls(steps) == [0, 4_500, 9_000, 4_500]
 

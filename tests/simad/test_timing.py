@@ -8,7 +8,8 @@ from sacbus.simad import GECKO, SimadError, Steps, Timing, encode, highest_rate,
 
 
 def test_the_defaults_are_those_of_the_announcement() -> None:
-    assert GECKO == Timing(low=500, high=4_000, setup=4_000, hold=500)
+    assert (GECKO.low, GECKO.high, GECKO.setup, GECKO.hold) == (500, 4_000, 4_000, 500)
+    assert Timing() == GECKO
 
 
 def test_the_highest_rates_are_those_of_the_rules() -> None:
