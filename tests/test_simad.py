@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from io import BytesIO
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from tests.simad.reference import broken_rules, driven
 from tests.trace.rig import Dump, recorded, two_axes
 
 Captured = pytest.CaptureFixture[str]
+
+ROOT = Path(__file__).parents[1]
 
 #: Axes of two buses, two each way, that start together and come back one after the other.
 SCENARIO = """
@@ -316,3 +319,19 @@ def test_drawing_needs_matplotlib(
     without_matplotlib(monkeypatch)
     assert run(["simad", "encode", str(steps), "--plot", str(tmp_path / "a.svg")]) == 2
     assert "install it: python -m pip install 'sacbus[plot]'" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_fonts")
+def test_the_page_about_it_shows_what_it_prints_and_draws(tmp_path: Path, capsys: Captured) -> None:
+    page = (ROOT / "docs" / "simad.md").read_text(encoding="utf-8")
+    command, _, printed = (
+        page.partition("```console\n$ sacbus ")[2].partition("```")[0].partition("\n")
+    )
+    scenario, picture = str(ROOT / "examples/scenarios/simad.scenario.toml"), tmp_path / "steps.svg"
+    arguments = command.replace("examples/scenarios/simad.scenario.toml", scenario).split()
+    assert run([str(picture) if one == "steps.svg" else one for one in arguments]) == 0
+    assert capsys.readouterr().out == printed
+    drawn = r"<text[^>]*>([^<]*)</text>"
+    shown = (ROOT / "docs/simad/steps.svg").read_text(encoding="utf-8")
+    assert re.findall(drawn, shown) == re.findall(drawn, picture.read_text(encoding="utf-8"))
