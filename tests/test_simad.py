@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from sacbus.cli import run
+from sacbus.cli.axes import read_axes, source_of
 from sacbus.cli.recordings import span
-from sacbus.cli.simad_encode import RULES
+from sacbus.cli.simad_encode import RULES, _verdict
 from sacbus.simad import GECKO
 from sacbus.trace import read
 from tests.drawing import load_fonts, without_matplotlib
@@ -236,6 +237,19 @@ def test_a_scenario_that_does_not_come_out_right_gives_status_1(
     assert "axis left:11: 150 steps to -150, the node to -150" in captured.out
     assert captured.err.startswith("note: ")
     assert "149" in captured.err
+
+
+def test_lines_that_lead_elsewhere_than_the_node_are_an_error(
+    recording: Path, capsys: Captured
+) -> None:
+    axes = read_axes(None, None, "11")  # type: ignore[arg-type]  # click's, which it does not need
+    with source_of(str(recording), axes, {}, None) as source:
+        (right,) = source.positions()
+        assert right is not None
+        assert _verdict(source, [right]) == 0
+        assert _verdict(source, [right + 1]) == 1
+    told = f"error: axis 11: the lines lead to {right + 1}, the node to {right}\n"
+    assert told in capsys.readouterr().err
 
 
 def test_a_recording_that_was_cut_off_is_told(recording: Path, capsys: Captured) -> None:

@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["AxisReport", "Report", "Tally"]
 
-#: Squares up to this, of as many numbers as a piece has, add up to less than 63 bits.
-SMALL: Final = 1 << 23
-PIECE: Final = 1 << 17
+#: Sums of squares below this are worked out by numpy.
+SMALL: Final = 1 << 63
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +116,7 @@ class Tally:
         self.sum_of_squares = 0
 
     def add(self, delays: Times, clockwise: Flags) -> None:
-        """Some steps, at least one, :data:`PIECE` at most."""
+        """Some steps, at least one."""
         self.steps += delays.size
         self.position += 2 * int(np.count_nonzero(clockwise)) - delays.size
         worst = int(delays.max())
@@ -126,7 +125,7 @@ class Tally:
         self.worst = max(self.worst, worst)
         self.moved += int(np.count_nonzero(delays))
         self.sum += int(delays.sum())
-        if worst < SMALL:
+        if worst * worst * delays.size < SMALL:
             self.sum_of_squares += int(np.dot(delays, delays))
         else:
             self.sum_of_squares += sum(one * one for one in delays.tolist())

@@ -142,7 +142,6 @@ class Progress:
         for due, axis, number in zip(times.tolist(), axes.tolist(), numbers.tolist(), strict=True):
             if number != present:
                 present, ready = number, last + turn
-                last = NEVER
                 lasts.append(last)
                 readies.append(ready)
             fall = max(due, free[axis], ready)

@@ -49,6 +49,10 @@ def test_what_falls_together_is_seen_together() -> None:
     coded = encode(steps, 6)
     found = excerpt(steps, coded.falls, coded.edges, at=1, few=2)
     assert (found.number, found.due.count) == (2, 6)
+    # The one that had to move is the last of an instant: the others are there as well.
+    steps = Steps.of([0, *[100_000] * 5], [0, *range(4), 3], [1] * 6)
+    coded = encode(steps, 4)
+    assert excerpt(steps, coded.falls, coded.edges).number == 2
 
 
 def test_of_no_steps_there_is_nothing_to_see() -> None:
