@@ -5,12 +5,21 @@ MotherError                        everything below
 ├── Refused                        the node answered NAK, every time
 ├── NoAnswer (TimeoutError)        silence, and what was asked may safely be asked again
 ├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
+├── Stopped                        an emergency stop came before its turn; never sent
 └── LineLost (ConnectionError)     the link is gone
 """
 
 from __future__ import annotations
 
-__all__ = ["BadRequest", "LineLost", "MotherError", "NoAnswer", "Refused", "UnknownOutcome"]
+__all__ = [
+    "BadRequest",
+    "LineLost",
+    "MotherError",
+    "NoAnswer",
+    "Refused",
+    "Stopped",
+    "UnknownOutcome",
+]
 
 
 class MotherError(Exception):
@@ -57,6 +66,22 @@ class UnknownOutcome(_Unanswered, TimeoutError):
     """
 
     verdict = "it may have been executed; look at the node before you send it again"
+
+
+class Stopped(MotherError):
+    """An emergency stop came while this waited for its turn: it has not been sent, and will not be.
+
+    ``node`` is 0 for a broadcast.
+    """
+
+    def __init__(self, node: int, line: str) -> None:
+        self.node = node
+        self.line = line
+        whom = f"node {node}" if node else "all nodes"
+        super().__init__(
+            f"{whom}: {line!r} was not sent: an emergency stop came first; send it again once the "
+            "machine may move"
+        )
 
 
 class LineLost(MotherError, ConnectionError):
