@@ -23,7 +23,7 @@ from sacbus.node import BOOT, OFF, STANDBY, Node
 
 __all__ = ["Watchdog"]
 
-#: The states of a node that needs no stopping, unless a command waits in it.
+#: The states of a node that moves nothing, and holds no command that would.
 AT_REST: Final = frozenset((STANDBY, BOOT, OFF))
 
 #: How long after the end of a packet a node has surely acted on it: at once, by the byte.
@@ -70,19 +70,15 @@ class Watchdog:
 
     def _stop(self, where: str) -> None:
         now = self._bus.kernel.now
-        stopped = [node for node in self._bus.nodes if _does_something(node, now)]
-        for node in stopped:
+        stopped = []
+        # All of them: what a node keeps, until a pin is let go, may not be seen from outside.
+        for node in self._bus.nodes:
+            if node.state(now) not in AT_REST:
+                stopped.append(node)
             node.stop(now)
             self._bus.touch(node)
         if stopped:
             self._tell(f"watchdog: {where} is gone, stopped {_named(stopped)}")
-
-
-def _does_something(node: Node, now: Ns) -> bool:
-    if node.state(now) not in AT_REST:
-        return True
-    # A command that has been loaded and waits for its time moves nothing yet.
-    return bool(node.snapshot(now).current)
 
 
 def _named(nodes: list[Node]) -> str:
