@@ -103,6 +103,8 @@ class Caller:
         #: appointment of one before.
         self._due: Ns = 0
         self._look_at: Ns | None = None
+        #: When an answer is due by the line's own figures, after how long, by the body's size.
+        self._expected: dict[int, Ns] = {}
         #: Nodes that were given up before all of the slack was over, and when that is.
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
@@ -282,7 +284,6 @@ class Caller:
         request.attempts += 1
         clock = self._clock
         request.sent_at = now = clock.now
-        line_time = self._rate.span(len(request.data))
         statistics = self.statistics[request.node]
         statistics.sent += 1
         if request.attempts > 1:
@@ -290,6 +291,7 @@ class Caller:
         if request.node == GENERAL_CALL:
             self._pausing = True
             self._broadcasting = request
+            line_time = self._rate.span(len(request.data))
             clock.at(now + line_time + self._gap, self._broadcast_over)
         else:
             self._outstanding = request
@@ -309,11 +311,11 @@ class Caller:
             return
         self._outstanding = None
         statistics = self.statistics[request.node]
-        self._pause()
         if answer.accepted:
             round_trip = self._clock.now - request.sent_at
             statistics.acks += 1
             statistics.round_trips.append(round_trip)
+            self._pause()
             request.done(Acknowledged(request.node, request.attempts, round_trip))
             return
         statistics.naks += 1
@@ -321,7 +323,9 @@ class Caller:
         request.refusals += 1
         if request.attempts < request.tries and not request.withdrawn:
             self._waiting.appendleft(request)
+            self._pause()
         else:
+            self._pause()
             request.done(self._failure(request))
 
     def _look(self) -> None:
@@ -344,8 +348,12 @@ class Caller:
 
     def _patience(self, request: _Request) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
-        answer = turnaround(len(request.body), nul_follows=True) + self._rate.span(ANSWER_BYTES)
-        return self._rate.span(len(request.data)) + answer + request.slack
+        size = len(request.body)
+        expected = self._expected.get(size)
+        if expected is None:
+            answer = turnaround(size, nul_follows=True) + self._rate.span(ANSWER_BYTES)
+            expected = self._expected[size] = self._rate.span(len(request.data)) + answer
+        return expected + request.slack
 
     def _silent(self, request: _Request) -> None:
         self._outstanding = None
@@ -361,9 +369,12 @@ class Caller:
         self._next()
 
     def _pause(self) -> None:
-        """Leave the node the time in which it is deaf."""
-        self._pausing = True
-        self._clock.at(self._clock.now + self._gap, self._pause_over)
+        """Leave the node the time in which it is deaf, then go on."""
+        if self._gap:
+            self._pausing = True
+            self._clock.at(self._clock.now + self._gap, self._pause_over)
+        else:
+            self._next()
 
     def _pause_over(self) -> None:
         self._pausing = False

@@ -15,13 +15,14 @@ class LoopClock:
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
+        self._time = loop.time
         self._start = loop.time()
 
     @property
     def now(self) -> Ns:
         """Ns since the start."""
         # Rounded: a timer that fires at its very time must not find itself a nanosecond early.
-        return round((self._loop.time() - self._start) * SECOND)
+        return round((self._time() - self._start) * SECOND)
 
     def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
         """Call back then; gives the loop's timer handle."""
