@@ -10,22 +10,15 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from sacbus.kernel import MS, LineRate, Ns
 from sacbus.language import repeatable
 from sacbus.mother.clock import Clock
-from sacbus.mother.errors import (
-    LineLost,
-    MotherError,
-    NoAnswer,
-    Refused,
-    Stopped,
-    UnknownOutcome,
-)
+from sacbus.mother.errors import LineLost, MotherError
 from sacbus.mother.estop import EmergencyStop
 from sacbus.mother.outcome import Acknowledged, Done, Sent
+from sacbus.mother.pending import Request
 from sacbus.mother.request import checked_address, safe_body
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
@@ -47,25 +40,6 @@ SLACK: Final[Ns] = 10 * MS
 
 #: Attempts for what may be repeated.
 TRIES: Final = 3
-
-
-@dataclass(slots=True)
-class _Request:
-    node: int
-    body: bytes
-    data: bytes
-    done: Done
-    #: Whether it may run twice: the caller said so, or, as looked up at silence, the line may.
-    may_repeat: bool
-    tries: int
-    #: How late its answer may be.
-    slack: Ns
-    attempts: int = 0
-    refusals: int = 0
-    sent_at: Ns = 0
-    last: str = "none"
-    #: It is not to be sent again: nobody waits for it any more, or an emergency stop has come.
-    withdrawn: bool = False
 
 
 class Caller:
@@ -96,8 +70,8 @@ class Caller:
         self._tries = tries
         self._gap = gap
         self._receiver = PacketReceiver()
-        self._waiting: deque[_Request] = deque()
-        self._outstanding: _Request | None = None
+        self._waiting: deque[Request] = deque()
+        self._outstanding: Request | None = None
         #: When the outstanding request's answer is overdue, and for when the next look at it is
         #: appointed. Nearly all answers come in time, and nearly all requests do with the
         #: appointment of one before.
@@ -109,7 +83,7 @@ class Caller:
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
         self._pausing = False
-        self._broadcasting: _Request | None = None
+        self._broadcasting: Request | None = None
         #: The emergency stop that is under way, and who waits for its end.
         self._stop: EmergencyStop | None = None
         self._stopping: list[Done] = []
@@ -139,7 +113,7 @@ class Caller:
         checked_address(node)
         body = safe_body(line)
         self._enqueue(
-            _Request(
+            Request(
                 node,
                 body,
                 encode(node, MOTHER, body),
@@ -159,14 +133,14 @@ class Caller:
         checked_address(node)
         data = encode(node, MOTHER, b"")
         self._enqueue(
-            _Request(node, b"", data, done, may_repeat=True, tries=1, slack=min(slack, self._slack))
+            Request(node, b"", data, done, may_repeat=True, tries=1, slack=min(slack, self._slack))
         )
 
     def broadcast(self, line: bytes, done: Done) -> None:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
         body = safe_body(line)
         self._enqueue(
-            _Request(
+            Request(
                 GENERAL_CALL,
                 body,
                 encode(GENERAL_CALL, MOTHER, body),
@@ -207,10 +181,7 @@ class Caller:
         self._waiting.clear()
         # Only now, for those who are told may ask for more.
         for request in waiting:
-            if request.attempts:
-                request.done(self._failure(request))
-            else:
-                request.done(Stopped(request.node, _shown(request.body)))
+            request.done(request.failure())
 
     def withdraw(self, done: Done) -> None:
         """Nobody waits any more for the request of this ``done``.
@@ -253,7 +224,7 @@ class Caller:
             if request is not None:
                 request.done(self._lost)
 
-    def _enqueue(self, request: _Request) -> None:
+    def _enqueue(self, request: Request) -> None:
         if self._lost is not None:
             request.done(self._lost)
             return
@@ -267,12 +238,12 @@ class Caller:
             and not self._pausing
             and self._waiting
             and self._stop is None
-            and not (self._unsettled and self._unsettled_is(self._waiting[0].node))
+            and not (self._unsettled and self._may_still_answer(self._waiting[0].node))
         ):
             self._attempt(self._waiting.popleft())
 
-    def _unsettled_is(self, node: int) -> bool:
-        """Whether an answer of ``node`` to a probe may still come; then it is waited for."""
+    def _may_still_answer(self, node: int) -> bool:
+        """Whether an answer of ``node`` to a probe may yet come; then it is waited for first."""
         until = self._unsettled.pop(node, 0)
         if until <= self._clock.now:
             return False
@@ -280,7 +251,7 @@ class Caller:
         self._clock.at(until, self._pause_over)
         return True
 
-    def _attempt(self, request: _Request) -> None:
+    def _attempt(self, request: Request) -> None:
         request.attempts += 1
         clock = self._clock
         request.sent_at = now = clock.now
@@ -321,12 +292,12 @@ class Caller:
         statistics.naks += 1
         request.last = "NAK"
         request.refusals += 1
-        if request.attempts < request.tries and not request.withdrawn:
+        if request.again:
             self._waiting.appendleft(request)
             self._pause()
         else:
             self._pause()
-            request.done(self._failure(request))
+            request.done(request.failure())
 
     def _look(self) -> None:
         """See whether the answer that we wait for is overdue."""
@@ -346,7 +317,7 @@ class Caller:
         else:
             self._silent(request)
 
-    def _patience(self, request: _Request) -> Ns:
+    def _patience(self, request: Request) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
         size = len(request.body)
         expected = self._expected.get(size)
@@ -355,17 +326,17 @@ class Caller:
             expected = self._expected[size] = self._rate.span(len(request.data)) + answer
         return expected + request.slack
 
-    def _silent(self, request: _Request) -> None:
+    def _silent(self, request: Request) -> None:
         self._outstanding = None
         self.statistics[request.node].timeouts += 1
         request.last = "silence"
         request.may_repeat = request.may_repeat or repeatable(request.body)
         if request.slack < self._slack:
             self._unsettled[request.node] = self._clock.now + self._slack - request.slack
-        if request.may_repeat and request.attempts < request.tries and not request.withdrawn:
+        if request.may_repeat and request.again:
             self._waiting.appendleft(request)
         else:
-            request.done(self._failure(request))
+            request.done(request.failure())
         self._next()
 
     def _pause(self) -> None:
@@ -401,17 +372,3 @@ class Caller:
         waiting, self._stopping = self._stopping, []
         for done in waiting:
             done(outcome)
-
-    def _failure(self, request: _Request) -> MotherError:
-        """What is known in the end: NAK says that it was not executed, silence says nothing."""
-        kind: type[Refused | NoAnswer | UnknownOutcome] = UnknownOutcome
-        if request.refusals == request.attempts:
-            kind = Refused
-        elif request.may_repeat and not request.refusals:
-            kind = NoAnswer
-        return kind(request.node, _shown(request.body), request.attempts, request.last)
-
-
-def _shown(body: bytes) -> str:
-    """A line as it was asked for, without the space that its CRC may have needed."""
-    return body.decode("latin-1").rstrip(" ")
