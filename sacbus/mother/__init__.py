@@ -1,6 +1,6 @@
 """The master's side. This version: transactions; groups, paths and G-code follow."""
 
-from sacbus.mother.caller import Acknowledged, Caller, Clock, Sent
+from sacbus.mother.caller import Acknowledged, Caller, Clock, Sent, SoftOpHeard
 from sacbus.mother.errors import (
     BadRequest,
     LineLost,
@@ -30,6 +30,7 @@ __all__ = [
     "Release",
     "Sent",
     "Share",
+    "SoftOpHeard",
     "UnknownOutcome",
     "addressed_line",
     "safe_body",

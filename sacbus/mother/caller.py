@@ -19,6 +19,8 @@ from sacbus.mother.errors import LineLost, MotherError, NoAnswer, Refused, Unkno
 from sacbus.mother.request import checked_address, safe_body
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
+    DC1,
+    DC2,
     GENERAL_CALL,
     MOTHER,
     Answer,
@@ -29,11 +31,14 @@ from sacbus.wire import (
 )
 from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
 
-__all__ = ["Acknowledged", "Caller", "Clock", "Sent"]
+__all__ = ["Acknowledged", "Caller", "Clock", "Sent", "SoftOpHeard"]
 
 #: How long an answer may be late beyond the line's own figures, on a line in this process, once
 #: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
+
+#: The bodies of soft ops.
+_SOFT_OPS: Final = (bytes((DC1,)), bytes((DC2,)))
 
 #: Attempts for what may be repeated.
 TRIES: Final = 3
@@ -64,6 +69,18 @@ class Acknowledged:
 @dataclass(frozen=True, slots=True)
 class Sent:
     """A broadcast is out, and its pause over; nobody answers one."""
+
+
+@dataclass(frozen=True, slots=True)
+class SoftOpHeard:
+    """A node tells everybody that a command of its begins (DC1) or has ended (DC2).
+
+    at: when mother had the whole packet, ns by her clock; always as long after the event itself.
+    """
+
+    node: int
+    begins: bool
+    at: Ns
 
 
 @dataclass(slots=True)
@@ -121,6 +138,8 @@ class Caller:
         self.overheard = 0
         self.strays = 0
         self.faults = 0
+        #: Called with each soft op of a node's. Empty it is no more than counted.
+        self.soft_op_listeners: list[Callable[[SoftOpHeard], object]] = []
 
     def call(
         self,
@@ -185,6 +204,8 @@ class Caller:
                 self.faults += 1
             elif type(event) is Packet and event.src != MOTHER:
                 self.overheard += 1
+                if self.soft_op_listeners and event.dest == GENERAL_CALL:
+                    self._soft_op(event)
 
     @property
     def lost(self) -> LineLost | None:
@@ -233,6 +254,13 @@ class Caller:
                 self._watching = True
                 clock.at(self._due, self._look)
         self._send(request.data)
+
+    def _soft_op(self, packet: Packet) -> None:
+        if packet.body not in _SOFT_OPS:
+            return
+        heard = SoftOpHeard(packet.src, packet.body[0] == DC1, self._clock.now)
+        for listener in tuple(self.soft_op_listeners):
+            listener(heard)
 
     def _answered(self, answer: Answer) -> None:
         request = self._outstanding

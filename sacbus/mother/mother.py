@@ -69,7 +69,10 @@ class Mother:
         """
         self._clock = clock
         self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent)
+        self._clock = clock
         self._arrive = arrive or _call
+        #: Those who wait for a time by mother's clock.
+        self._sleepers: set[asyncio.Future[None]] = set()
 
     @classmethod
     @asynccontextmanager
@@ -124,6 +127,28 @@ class Mother:
     def lose(self, why: str) -> None:
         """The link's side: the line is gone."""
         self._caller.lose(why)
+        lost = self._caller.lost
+        for sleeper in self._sleepers:
+            if lost is not None and not sleeper.done():
+                sleeper.set_exception(lost)
+
+    @property
+    def now(self) -> Ns:
+        """The time by mother's clock, ns since some start: bus time, on a bus in this process."""
+        self._arrive(_nothing)
+        return self._clock.now
+
+    async def until(self, when: Ns) -> None:
+        """Wait until mother's clock shows ``when``; :class:`LineLost` if the line goes before."""
+        if self._caller.lost is not None:
+            raise self._caller.lost
+        sleeper: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._sleepers.add(sleeper)
+        self._arrive(self._clock.at, when, _wake, sleeper)
+        try:
+            await sleeper
+        finally:
+            self._sleepers.discard(sleeper)
 
     async def send(
         self, node: int, line: str | bytes, *, accept_duplicates: bool = False
@@ -190,6 +215,15 @@ def addressed_line(text: str) -> tuple[int, str]:
             f"node {short(found[1])}: expected an address from 4 to 255, or 0 for all nodes"
         )
     return node, found[2]
+
+
+def _nothing() -> None:
+    """What is done at a look at the clock."""
+
+
+def _wake(sleeper: asyncio.Future[None]) -> None:
+    if not sleeper.done():
+        sleeper.set_result(None)
 
 
 def _call(callback: Callable[..., object], *arguments: object) -> None:

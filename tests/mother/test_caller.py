@@ -21,6 +21,7 @@ from sacbus.mother import (
     Sent,
     UnknownOutcome,
 )
+from sacbus.mother.caller import SoftOpHeard
 from sacbus.wire import encode
 from tests.mother.rig import Outcome, Rig, Weather, answer_lost, body_spoilt, packet_lost
 
@@ -312,6 +313,28 @@ def test_packets_of_others_are_counted_and_noise_is_too() -> None:
     assert rig.caller.overheard == 1
     assert rig.caller.faults == 2
     assert rig.caller.strays == 0
+
+
+def test_soft_ops_are_told_to_who_listens() -> None:
+    rig = Rig(10)
+    heard: list[SoftOpHeard] = []
+    rig.ask(10, b"$O1")
+    rig.caller.soft_op_listeners.append(heard.append)
+    begin = rig.kernel.now
+    # A tenth of a second of wait, so that its ACK is long out when it starts.
+    rig.ask(10, b"m2v60a999d999t100000")
+    assert [(one.node, one.begins) for one in heard] == [(10, True), (10, False)]
+    assert heard[0].at > begin + 100 * MS
+    assert heard[1].at - heard[0].at == 10 * MS
+    # A message of another node's to everybody, and a soft op to one node alone, are none.
+    rig.interrupt(rig.kernel.now + MS, encode(0, 11, b" hello"))
+    rig.interrupt(rig.kernel.now + 20 * MS, encode(85, 11, b"\x11"))
+    rig.kernel.run()
+    assert len(heard) == 2
+    rig.caller.soft_op_listeners.clear()
+    rig.ask(10, b"m1")
+    assert len(heard) == 2
+    assert rig.caller.overheard == 6
 
 
 def test_mothers_own_bytes_echoed_by_the_adapter_are_nobody_elses() -> None:

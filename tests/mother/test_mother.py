@@ -147,6 +147,32 @@ def test_two_mothers_of_one_bus_take_no_answer_of_each_others() -> None:
     virtually(play)
 
 
+def test_mother_waits_by_the_clock_of_her_bus() -> None:
+    async def play(bus: HostedBus, mother: Mother) -> None:
+        await mother.until(3 * SECOND + 1)
+        assert mother.now == bus.now() == 3 * SECOND + 1
+        await mother.until(2 * SECOND)
+        assert mother.now == 3 * SECOND + 1
+
+    virtually(play)
+
+
+def test_who_waits_for_a_time_is_told_when_the_line_goes() -> None:
+    async def play(bus: HostedBus, mother: Mother) -> None:
+        waiting = asyncio.create_task(mother.until(3 * SECOND))
+        cancelled = asyncio.create_task(mother.until(3 * SECOND))
+        await asyncio.sleep(1)
+        cancelled.cancel()
+        mother.lose("unplugged")
+        with pytest.raises(LineLost, match="unplugged"):
+            await waiting
+        assert cancelled.cancelled()
+        with pytest.raises(LineLost, match="unplugged"):
+            await mother.until(4 * SECOND)
+
+    virtually(play)
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
