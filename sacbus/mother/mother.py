@@ -69,7 +69,6 @@ class Mother:
         """
         self._clock = clock
         self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent)
-        self._clock = clock
         self._arrive = arrive or _call
         #: Those who wait for a time by mother's clock.
         self._sleepers: set[asyncio.Future[None]] = set()
@@ -96,24 +95,6 @@ class Mother:
     def caller(self) -> Caller:
         """The transactions themselves, for whoever waits for them without a loop."""
         return self._caller
-
-    @property
-    def now(self) -> Ns:
-        """Mother's clock, ns since some start."""
-        return self._clock.now
-
-    async def until(self, when: Ns) -> None:
-        """Wait until mother's clock shows ``when``; at once if it is past."""
-        if when <= self._clock.now:
-            return
-        future: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-
-        def due() -> None:
-            if not future.done():
-                future.set_result(None)
-
-        self._arrive(self._clock.at, when, due)
-        await future
 
     @property
     def statistics(self) -> Mapping[int, NodeStatistics]:
