@@ -6,10 +6,12 @@ from sacbus.mother.errors import (
     LineLost,
     MotherError,
     NoAnswer,
+    NotStarted,
     Refused,
     UnknownOutcome,
 )
 from sacbus.mother.mother import Mother, addressed_line
+from sacbus.mother.release import Release, Share, stand_down, start_together
 from sacbus.mother.request import safe_body
 from sacbus.mother.statistics import NodeStatistics
 
@@ -23,10 +25,15 @@ __all__ = [
     "MotherError",
     "NoAnswer",
     "NodeStatistics",
+    "NotStarted",
     "Refused",
+    "Release",
     "Sent",
+    "Share",
     "SoftOpHeard",
     "UnknownOutcome",
     "addressed_line",
     "safe_body",
+    "stand_down",
+    "start_together",
 ]

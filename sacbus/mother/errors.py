@@ -5,12 +5,21 @@ MotherError                        everything below
 ├── Refused                        the node answered NAK, every time
 ├── NoAnswer (TimeoutError)        silence, and what was asked may safely be asked again
 ├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
+├── NotStarted                     of several that were to start together, none has
 └── LineLost (ConnectionError)     the link is gone
 """
 
 from __future__ import annotations
 
-__all__ = ["BadRequest", "LineLost", "MotherError", "NoAnswer", "Refused", "UnknownOutcome"]
+__all__ = [
+    "BadRequest",
+    "LineLost",
+    "MotherError",
+    "NoAnswer",
+    "NotStarted",
+    "Refused",
+    "UnknownOutcome",
+]
 
 
 class MotherError(Exception):
@@ -57,6 +66,24 @@ class UnknownOutcome(_Unanswered, TimeoutError):
     """
 
     verdict = "it may have been executed; look at the node before you send it again"
+
+
+class NotStarted(MotherError):
+    """Of several nodes that were to start together none has: ``node`` failed, ``cause`` says how.
+
+    ``still_held``: nodes that may be held at sync, since they did not acknowledge the S that was
+    sent to them then; they would start with the next ``y``.
+    """
+
+    def __init__(self, node: int, cause: MotherError, still_held: tuple[int, ...] = ()) -> None:
+        self.node = node
+        self.cause = cause
+        self.still_held = still_held
+        told = f"nothing was started: {cause}"
+        if still_held:
+            which = ", ".join(map(str, still_held))
+            told += f"; {which} may still be held at sync, send S before the next y"
+        super().__init__(told)
 
 
 class LineLost(MotherError, ConnectionError):

@@ -67,8 +67,8 @@ class Mother:
         ``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a host's,
         when mother sits on a bus in this process.
         """
-        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent)
         self._clock = clock
+        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent)
         self._arrive = arrive or _call
         #: Those who wait for a time by mother's clock.
         self._sleepers: set[asyncio.Future[None]] = set()
