@@ -1,5 +1,6 @@
 """The master's side. This version: transactions; groups, paths and G-code follow."""
 
+from sacbus.mother.calibrate import Calibration, NoSoftOp, calibrate
 from sacbus.mother.caller import Acknowledged, Caller, Clock, Sent, SoftOpHeard
 from sacbus.mother.errors import (
     BadRequest,
@@ -10,6 +11,7 @@ from sacbus.mother.errors import (
     Refused,
     UnknownOutcome,
 )
+from sacbus.mother.group import Group, GroupMotion, GroupRun, Member
 from sacbus.mother.mother import Mother, addressed_line
 from sacbus.mother.release import Release, Share, stand_down, start_together
 from sacbus.mother.request import safe_body
@@ -18,12 +20,18 @@ from sacbus.mother.statistics import NodeStatistics
 __all__ = [
     "Acknowledged",
     "BadRequest",
+    "Calibration",
     "Caller",
     "Clock",
+    "Group",
+    "GroupMotion",
+    "GroupRun",
     "LineLost",
+    "Member",
     "Mother",
     "MotherError",
     "NoAnswer",
+    "NoSoftOp",
     "NodeStatistics",
     "NotStarted",
     "Refused",
@@ -33,6 +41,7 @@ __all__ = [
     "SoftOpHeard",
     "UnknownOutcome",
     "addressed_line",
+    "calibrate",
     "safe_body",
     "stand_down",
     "start_together",

@@ -10,7 +10,7 @@ import asyncio
 import re
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from sacbus.kernel import MS, SECOND, LineRate, Ns
 from sacbus.language.line import quoted, short
@@ -18,6 +18,9 @@ from sacbus.links import open_line
 from sacbus.mother.caller import SLACK, Acknowledged, Caller, Clock, Sent
 from sacbus.mother.errors import BadRequest, MotherError
 from sacbus.mother.statistics import NodeStatistics
+
+if TYPE_CHECKING:
+    from sacbus.mother.group import Group, Member
 
 __all__ = ["LINK_SLACK", "LoopClock", "Mother", "addressed_line"]
 
@@ -153,6 +156,18 @@ class Mother:
     async def broadcast(self, line: str | bytes) -> None:
         """Send a line to all nodes; returns when the next packet may follow. Nobody answers."""
         await self._outcome(lambda done: self._caller.broadcast(_bytes(line), done))
+
+    def group(
+        self, axes: Mapping[str, int | Member] | None = None, /, **named: int | Member
+    ) -> Group:
+        """Axes that start together: ``mother.group(x=10, y=11)``, or a mapping of names to nodes.
+
+        A :class:`Member` in place of a node's address tells its settings. :class:`BadRequest` for
+        two axes on one node, and what no node can be.
+        """
+        from sacbus.mother.group import Group  # noqa: PLC0415 (it stands on this file)
+
+        return Group(self, {**(axes or {}), **named})
 
     async def _outcome(
         self, ask: Callable[[Callable[[Acknowledged | Sent | MotherError], None]], None]

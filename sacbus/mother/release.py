@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from sacbus.kernel import Ns
-from sacbus.mother.errors import MotherError, NotStarted
+from sacbus.mother.errors import MotherError, NotStarted, Refused
 from sacbus.mother.mother import Mother
 
 __all__ = [
@@ -36,7 +36,8 @@ class Share:
     """What one node is told before a common start.
 
     load: lines that put what it is to run into its queue; they may be repeated without harm. hold:
-    lines after which it is held at sync.
+    lines after which it is held at sync. They are sent again after silence, whatever they are: Xnn,
+    which must not run twice elsewhere, only holds again as long as nobody is released.
     """
 
     node: int
@@ -81,9 +82,11 @@ async def start_together(
         for share in shares:
             # Before the outcome is known: silence leaves open whether it is held.
             held.append(share.node)
-            await _tell(mother, share.node, share.hold)
+            await _tell(mother, share.node, share.hold, accept_duplicates=True)
     except _Failed as failed:
         still_held = await stand_down(mother, held)
+        if isinstance(failed.cause, Refused):  # who says NAK has not acted
+            still_held = tuple(node for node in still_held if node != failed.node)
         raise NotStarted(failed.node, failed.cause, still_held) from failed.cause
     except BaseException:
         await stand_down(mother, held)
@@ -117,9 +120,11 @@ class _Failed(Exception):
         self.cause = cause
 
 
-async def _tell(mother: Mother, node: int, lines: Sequence[str]) -> None:
+async def _tell(
+    mother: Mother, node: int, lines: Sequence[str], *, accept_duplicates: bool = False
+) -> None:
     for line in lines:
         try:
-            await mother.send(node, line)
+            await mother.send(node, line, accept_duplicates=accept_duplicates)
         except MotherError as cause:
             raise _Failed(node, cause) from cause
