@@ -177,7 +177,9 @@ class Plan:
 
     def _run(self) -> _Run:
         session = Session.start(Defaults(sprf=self.drive.steps_per_rev))
-        return _Run(self.drive, _Standing(session, replace(REST, kept_rpm=self._start_rpm)), gap=self._gap)
+        return _Run(
+            self.drive, _Standing(session, replace(REST, kept_rpm=self._start_rpm)), gap=self._gap
+        )
 
 
 def plan_sequence(
