@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +13,9 @@ from sacbus.mother import BadRequest
 from sacbus.mother.edits import LONGEST_EDIT, edit_lines, hold_line
 
 BITS_32 = 2**32 - 1
+
+#: Those that do not depend on each other.
+FIELDS = ("steps", "cw", "acc100", "dec100", "linear", "extra_pulses", "wait_us", "sync", "pulses")
 
 hundredths = st.integers(1, 9_999) | st.integers(100, 999).map(lambda whole: whole * 100)
 defaults = st.builds(Defaults, sprf=st.sampled_from([48, 200, 400]), cw=st.booleans())
@@ -57,6 +62,25 @@ def test_whatever_stood_there_is_replaced_whole(data: st.DataObject) -> None:
     assert row == wanted
     # Whoever was held at this position is held until the last line.
     assert held[:-1] == [before.sync] * (len(lines) - 1)
+
+
+@given(st.data())
+def test_of_what_is_known_to_stand_there_only_what_differs_is_named(data: st.DataObject) -> None:
+    of = data.draw(defaults)
+    before = data.draw(motions(of))
+    wanted = data.draw(st.just(before) | st.builds(replace, st.just(before), **{
+        name: st.just(getattr(data.draw(motions(of)), name))
+        for name in data.draw(st.sets(st.sampled_from(FIELDS)))
+    }))  # fmt: skip
+    row = before
+    lines = edit_lines(7, wanted, of, before=before)
+    for line in lines:
+        parsed = parse(line.encode())
+        assert isinstance(parsed.command, EditQueue)
+        row = edited(row, parsed.command.edit, of)
+    assert row == wanted
+    assert (lines == []) == (wanted == before)
+    assert len("".join(lines)) <= len("".join(edit_lines(7, wanted, of)))
 
 
 def motion(**fields: object) -> Motion:
