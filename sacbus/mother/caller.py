@@ -40,6 +40,12 @@ SLACK: Final[Ns] = 10 * MS
 #: The bodies of soft ops.
 _SOFT_OPS: Final = (bytes((DC1,)), bytes((DC2,)))
 
+#: What makes a packet of a body: STX, two addresses, ETX, CRC, NUL.
+FRAME_BYTES: Final = 6
+
+#: The space that a body may need for its CRC.
+_PADDING: Final = 1
+
 #: Attempts for what may be repeated.
 TRIES: Final = 3
 
@@ -299,10 +305,20 @@ class Caller:
         else:
             self._silent(request)
 
+    def longest_call(self, body: int) -> Ns:
+        """How long a call may take once it is its turn, if every attempt but the last fails.
+
+        For a line of ``body`` bytes; on a line that takes at once what it is given.
+        """
+        return MOTHER_GAP + self._tries * (self._patience_of(body + _PADDING) + MOTHER_GAP)
+
     def _patience(self, request: _Request) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
-        answer = turnaround(len(request.body), nul_follows=True) + self._rate.span(ANSWER_BYTES)
-        return self._rate.span(len(request.data)) + answer + self._slack
+        return self._patience_of(len(request.body))
+
+    def _patience_of(self, body: int) -> Ns:
+        answer = turnaround(body, nul_follows=True) + self._rate.span(ANSWER_BYTES)
+        return self._rate.span(body + FRAME_BYTES) + answer + self._slack
 
     def _silent(self, request: _Request) -> None:
         self._outstanding = None

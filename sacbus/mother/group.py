@@ -15,7 +15,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from sacbus.kernel import MS, US, Ns
+from sacbus.kernel import US, Ns
 from sacbus.language import QUEUE_LENGTH, Defaults, Motion, Move, RunPosition, Session, parse
 from sacbus.language.line import quoted
 from sacbus.mother.edits import edit_lines
@@ -23,6 +23,7 @@ from sacbus.mother.errors import BadRequest
 from sacbus.mother.mother import Mother
 from sacbus.mother.release import Release, Share, stand_down, start_together
 from sacbus.mother.request import checked_address
+from sacbus.mother.timeline import DRIFT_PPM, Departure
 from sacbus.motion import TICKS_PER_US, Drive, Profile, plan
 
 __all__ = ["Command", "Group", "GroupMotion", "GroupRun", "Member"]
@@ -30,13 +31,6 @@ __all__ = ["Command", "Group", "GroupMotion", "GroupRun", "Member"]
 #: What an axis is to do: a line such as ``"m400v120"``, steps (negative: against the node's default
 #: direction), or a motion with every value in it.
 Command = str | int | Motion
-
-#: By how much a node's oscillator may be slow, in parts in a million, and what a planned time has
-#: besides.
-DRIFT_PPM: Final = 500
-MARGIN: Final[Ns] = 5 * MS
-
-_PPM: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +76,9 @@ class GroupRun:
         self.motions: Final = motions
         #: When they were released, by mother's clock.
         self.release: Final = release
-        longest = max(motion.end for motion in motions.values())
-        #: When all of them are certainly over, ns by mother's clock.
-        self.over_at: Final[Ns] = release.latest + longest + longest * drift_ppm // _PPM + MARGIN
+        departure = Departure(release.earliest, release.latest, drift_ppm)
+        #: When all of them are over for certain, ns by mother's clock.
+        self.over_at: Final[Ns] = departure.surely_by(max(one.end for one in motions.values()))
 
     @property
     def done(self) -> bool:
