@@ -33,11 +33,19 @@ from typing import TYPE_CHECKING, Final
 
 from sacbus.kernel import SECOND, Ns
 from sacbus.language import QUEUE_LENGTH, Defaults, LoopFinish, LoopStart, Motion
-from sacbus.motion import Drive
 from sacbus.mother.edits import edit_lines, hold_line
 from sacbus.mother.errors import BadRequest, MotherError
+from sacbus.mother.queue_file import RowRefused
 from sacbus.mother.request import checked_address
-from sacbus.mother.timeline import DRIFT_PPM, Departure, Timeline, Times, check_streamed
+from sacbus.mother.timeline import (
+    DRIFT_PPM,
+    Departure,
+    NotStreamable,
+    Timeline,
+    Times,
+    check_streamed,
+)
+from sacbus.motion import Drive
 
 if TYPE_CHECKING:
     from sacbus.mother.mother import Mother
@@ -104,6 +112,7 @@ class QueueStream:
         self._drive = drive or Drive()
         self._defaults = defaults or Defaults(sprf=self._drive.steps_per_rev)
         self._drift_ppm = drift_ppm
+        self._gap = gap
         self._timeline = Timeline(self._drive, gap=gap)
         self._departure: Departure | None = None
         #: What stands in each position, as far as it was written here.
@@ -135,6 +144,17 @@ class QueueStream:
         begun = [one.number for one in self._ahead if departure.latest + one.times.start <= now]
         return max(begun, default=self.done)
 
+    def survey(self, motions: Iterable[Motion]) -> tuple[int, Ns]:
+        """How many they are, and how long they take; nothing is sent.
+
+        :class:`RowRefused` at the first that cannot be streamed. ns, without pauses.
+        """
+        timeline, count = Timeline(self._drive, gap=self._gap), 0
+        for motion in self._planned(motions):
+            timeline.add(motion)
+            count += 1
+        return count, timeline.end
+
     async def run(
         self, motions: Iterable[Motion], *, progress: Callable[[int], object] | None = None
     ) -> None:
@@ -145,7 +165,7 @@ class QueueStream:
         ``progress`` is called now and then with the number of rows that are over.
 
         Whatever ends it early, a cancelled call too, the node is stopped with S where it is, and
-        :attr:`row` tells in which row. Raises :class:`BadRequest` at a row that cannot be streamed,
+        :attr:`row` tells in which row. Raises :class:`RowRefused` at one that cannot be streamed,
         :class:`LostTrack`, and what :meth:`Mother.send` does.
         """
         self._progress = progress
@@ -170,8 +190,10 @@ class QueueStream:
             try:
                 check_streamed(motion)
                 edit_lines(1, motion, self._defaults)
+            except NotStreamable as fault:
+                raise RowRefused(number, fault.what, fault.remedy) from fault
             except BadRequest as fault:
-                raise BadRequest(f"row {number}: {fault}") from fault
+                raise RowRefused(number, str(fault), "change it") from fault
             yield motion
 
     # ---- writing ----

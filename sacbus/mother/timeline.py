@@ -13,10 +13,18 @@ from typing import Final, NamedTuple
 
 from sacbus.kernel import MS, US, Ns
 from sacbus.language import Motion
-from sacbus.motion import REST, TICKS_PER_US, Drive, Left, begin, plan
 from sacbus.mother.errors import BadRequest
+from sacbus.motion import REST, TICKS_PER_US, Drive, Left, begin, plan
 
-__all__ = ["DRIFT_PPM", "MARGIN", "Departure", "Timeline", "Times", "check_streamed"]
+__all__ = [
+    "DRIFT_PPM",
+    "MARGIN",
+    "Departure",
+    "NotStreamable",
+    "Timeline",
+    "Times",
+    "check_streamed",
+]
 
 #: By how much a node's oscillator may be off, in parts in a million, and what a planned time has
 #: besides: loading, and how late a line may bring what mother sent.
@@ -24,6 +32,14 @@ DRIFT_PPM: Final = 500
 MARGIN: Final[Ns] = 5 * MS
 
 _PPM: Final = 1_000_000
+
+
+class NotStreamable(BadRequest):
+    """A command that cannot stand among those whose times are planned. what; remedy: words."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        self.what, self.remedy = what, remedy
+        super().__init__(f"{what}, {remedy}")
 
 
 class Times(NamedTuple):
@@ -56,7 +72,7 @@ class Timeline:
         return self._end * US // TICKS_PER_US
 
     def add(self, motion: Motion) -> Times:
-        """The next command; :class:`BadRequest` as of :func:`check_streamed`."""
+        """The next command; :class:`NotStreamable` as of :func:`check_streamed`."""
         check_streamed(motion)
         beginning = begin(motion, self._left, self._end, gap=self._gap)
         profile = plan(motion, self._drive, beginning.start_rpm)
@@ -74,13 +90,15 @@ class Timeline:
 
 
 def check_streamed(motion: Motion) -> None:
-    """:class:`BadRequest` for a command after which nobody knows when the next one begins."""
+    """:class:`NotStreamable` for a command after which nobody knows when the next one begins."""
     if motion.steps is None:
-        raise BadRequest("a continuous command cannot be streamed: it never ends; give it steps")
+        raise NotStreamable(
+            "a continuous command cannot be streamed: it never ends", "give it steps"
+        )
     if motion.sync:
-        raise BadRequest(
-            "a command that is held for sync cannot be streamed: nobody knows when it is "
-            "released; take its sync out"
+        raise NotStreamable(
+            "a command that is held for sync cannot be streamed: nobody knows when it is released",
+            "take its sync out",
         )
 
 
