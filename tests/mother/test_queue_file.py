@@ -220,7 +220,7 @@ def test_positions_that_are_none_or_twice_are_refused() -> None:
 
 
 def test_what_is_no_row_is_told_by_line_and_column() -> None:
-    with pytest.raises(WrongRow, match="queue.csv line 2 column"):
+    with pytest.raises(WrongRow, match=r"queue\.csv line 2 column"):
         QueueFile.read(
             [" 1 , 800 , 0 , 1 , 100 , 3000 , 0 , 1 , 1 , 0 , 0 , 0 ", "nonsense"], "queue.csv"
         )
