@@ -1,7 +1,8 @@
-"""The master's side. This version: transactions; groups, paths and G-code follow."""
+"""The master's side: transactions, the emergency stop, the scan of a line."""
 
 from sacbus.mother.calibrate import Calibration, NoSoftOp, calibrate
-from sacbus.mother.caller import Acknowledged, Caller, Clock, Sent, SoftOpHeard
+from sacbus.mother.caller import Caller, SoftOpHeard
+from sacbus.mother.clock import Clock
 from sacbus.mother.errors import (
     BadRequest,
     LineLost,
@@ -9,12 +10,15 @@ from sacbus.mother.errors import (
     NoAnswer,
     NotStarted,
     Refused,
+    Stopped,
     UnknownOutcome,
 )
 from sacbus.mother.group import Group, GroupMotion, GroupRun, Member
 from sacbus.mother.mother import Mother, addressed_line
+from sacbus.mother.outcome import Acknowledged, Sent
 from sacbus.mother.release import Release, Share, stand_down, start_together
 from sacbus.mother.request import safe_body
+from sacbus.mother.scan import ScanProgress
 from sacbus.mother.statistics import NodeStatistics
 
 __all__ = [
@@ -36,9 +40,11 @@ __all__ = [
     "NotStarted",
     "Refused",
     "Release",
+    "ScanProgress",
     "Sent",
     "Share",
     "SoftOpHeard",
+    "Stopped",
     "UnknownOutcome",
     "addressed_line",
     "calibrate",

@@ -6,6 +6,7 @@ MotherError                        everything below
 ├── NoAnswer (TimeoutError)        silence, and what was asked may safely be asked again
 ├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
 ├── NotStarted                     of several that were to start together, none has
+├── Stopped                        an emergency stop came before its turn; never sent
 └── LineLost (ConnectionError)     the link is gone
 """
 
@@ -18,6 +19,7 @@ __all__ = [
     "NoAnswer",
     "NotStarted",
     "Refused",
+    "Stopped",
     "UnknownOutcome",
 ]
 
@@ -84,6 +86,22 @@ class NotStarted(MotherError):
             which = ", ".join(map(str, still_held))
             told += f"; {which} may still be held at sync, send S before the next y"
         super().__init__(told)
+
+
+class Stopped(MotherError):
+    """An emergency stop came while this waited for its turn: it has not been sent, and will not be.
+
+    ``node`` is 0 for a broadcast.
+    """
+
+    def __init__(self, node: int, line: str) -> None:
+        self.node = node
+        self.line = line
+        whom = f"node {node}" if node else "all nodes"
+        super().__init__(
+            f"{whom}: {line!r} was not sent: an emergency stop came first; send it again once the "
+            "machine may move"
+        )
 
 
 class LineLost(MotherError, ConnectionError):

@@ -8,45 +8,31 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Final
 
-from sacbus.kernel import MS, SECOND, LineRate, Ns
+from sacbus.kernel import MS, LineRate, Ns
 from sacbus.language.line import quoted, short
 from sacbus.links import open_line
-from sacbus.mother.caller import SLACK, Acknowledged, Caller, Clock, Sent
+from sacbus.mother.caller import SLACK, Caller
+from sacbus.mother.clock import Clock, LoopClock
 from sacbus.mother.errors import BadRequest, MotherError
+from sacbus.mother.outcome import Acknowledged, Done, Outcome, Sent
+from sacbus.mother.scan import EVERY_ADDRESS, ScanProgress, scan
 from sacbus.mother.statistics import NodeStatistics
+from sacbus.wire.times import MOTHER_GAP
 
 if TYPE_CHECKING:
     from sacbus.mother.group import Group, Member
 
-__all__ = ["LINK_SLACK", "LoopClock", "Mother", "addressed_line"]
+__all__ = ["LINK_SLACK", "Mother", "addressed_line"]
 
 #: How late an answer may be on a link out of this process: a USB adapter's 16 ms latency timer
 #: both ways, and a busy machine.
 LINK_SLACK: Final[Ns] = 100 * MS
 
 _ADDRESSED: Final = re.compile(r"0*([0-9]+)(.*)", re.DOTALL)
-
-
-class LoopClock:
-    """An event loop's clock for :class:`Caller`: ns since this object was made."""
-
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self._start = loop.time()
-
-    @property
-    def now(self) -> Ns:
-        """Ns since the start."""
-        # Rounded: a timer that fires at its very time must not find itself a nanosecond early.
-        return round((self._loop.time() - self._start) * SECOND)
-
-    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
-        """Call back then; gives the loop's timer handle."""
-        return self._loop.call_at(self._start + when / SECOND, callback, *arguments)
 
 
 class Mother:
@@ -64,30 +50,34 @@ class Mother:
         slack: Ns = SLACK,
         unsent: Callable[[], int] | None = None,
         arrive: Callable[..., None] | None = None,
+        gap: Ns = MOTHER_GAP,
     ) -> None:
         """Have ``send`` put bytes on a line, with ``slack`` for answers beyond the line's figures.
 
         ``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a host's,
-        when mother sits on a bus in this process.
+        when mother sits on a bus in this process. ``gap`` as :class:`Caller` has it.
         """
         self._clock = clock
-        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent)
+        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent, gap=gap)
         self._arrive = arrive or _call
         #: Those who wait for a time by mother's clock.
         self._sleepers: set[asyncio.Future[None]] = set()
 
     @classmethod
     @asynccontextmanager
-    async def connect(cls, link: str, *, baud: int = 38_400) -> AsyncIterator[Mother]:
+    async def connect(
+        cls, link: str, *, baud: int = 38_400, gap: Ns = MOTHER_GAP
+    ) -> AsyncIterator[Mother]:
         """Mother on a line, for an ``async with`` block.
 
         ``link`` is the path of a serial port or pty, ``socket://host:port`` or
         ``rfc2217://host:port``. Raises :class:`~sacbus.links.LinkError` when it cannot be opened; a
         line lost later raises :class:`LineLost` in every call, and so does one after the block.
+        ``gap``: ns that are left free after every answer and broadcast; 0 loses packets on devices.
         """
         clock = LoopClock(asyncio.get_running_loop())
         async with open_line(link, baud) as line:
-            mother = cls(clock, line.send, rate=LineRate(baud), slack=LINK_SLACK)
+            mother = cls(clock, line.send, rate=LineRate(baud), slack=LINK_SLACK, gap=gap)
             line.start(mother.hear, mother.lose)
             try:
                 yield mother
@@ -139,19 +129,16 @@ class Mother:
     ) -> Acknowledged:
         """Send one command line to a node and wait for its ACK.
 
-        Raises :class:`Refused`, :class:`NoAnswer`, :class:`UnknownOutcome`, :class:`LineLost`, and
-        :class:`BadRequest` for what cannot be sent. ``accept_duplicates`` lets a command that is
-        not idempotent be sent again after silence; it may then run twice. A cancelled call whose
-        turn has not come is never sent; one that is out is not sent again.
+        Raises :class:`Refused`, :class:`NoAnswer`, :class:`UnknownOutcome`, :class:`Stopped`,
+        :class:`LineLost`, and :class:`BadRequest` for what cannot be sent. ``accept_duplicates``
+        lets a command that is not idempotent be sent again after silence; it may then run twice. A
+        cancelled call whose turn has not come is never sent; one that is out is not sent again.
         """
-        outcome = await self._outcome(
+        return await self._acknowledged(
             lambda done: self._caller.call(
                 node, _bytes(line), done, accept_duplicates=accept_duplicates
             )
         )
-        if not isinstance(outcome, Acknowledged):
-            raise TypeError(f"an addressed packet ended in {outcome!r}")
-        return outcome
 
     async def broadcast(self, line: str | bytes) -> None:
         """Send a line to all nodes; returns when the next packet may follow. Nobody answers."""
@@ -169,12 +156,43 @@ class Mother:
 
         return Group(self, {**(axes or {}), **named})
 
-    async def _outcome(
-        self, ask: Callable[[Callable[[Acknowledged | Sent | MotherError], None]], None]
-    ) -> Acknowledged | Sent:
+    async def estop(self) -> None:
+        """Emergency stop: S to all nodes, at once and twice more 1 ms apart. Nothing is waited for.
+
+        The first S is handed to the link before anything else happens; this returns when the third
+        is out, which it will be also when the caller is cancelled meanwhile. Calls that wait for
+        their turn raise :class:`Stopped` and are never sent; the one that is out ends as it does
+        (its ACK may collide with S), but is not sent again. Mother can be used afterwards as
+        before. Nobody answers a broadcast, so who has stopped is for the caller to find out.
+        :class:`LineLost` when there is no line.
+        """
+        await self._outcome(self._caller.estop)
+
+    async def scan(
+        self,
+        addresses: Iterable[int] = EVERY_ADDRESS,
+        *,
+        progress: Callable[[ScanProgress], object] | None = None,
+    ) -> list[Acknowledged]:
+        """Ask every address whether a node is there; those that answer, in the order asked.
+
+        Each is asked with the empty line, which does nothing, three times before it is taken to be
+        absent: some 5 s for all 252 at 38 400 baud, less for those that answer. ``attempts`` counts
+        how often a node had to be asked, ``round_trip`` is that of its answer. ``progress`` is
+        called after each address. Other calls have their turns in between.
+        """
+        return await scan(self._caller, self._acknowledged, addresses, progress)
+
+    async def _acknowledged(self, ask: Callable[[Done], None]) -> Acknowledged:
+        outcome = await self._outcome(ask)
+        if not isinstance(outcome, Acknowledged):
+            raise TypeError(f"an addressed packet ended in {outcome!r}")
+        return outcome
+
+    async def _outcome(self, ask: Callable[[Done], None]) -> Acknowledged | Sent:
         future: asyncio.Future[Acknowledged | Sent] = asyncio.get_running_loop().create_future()
 
-        def done(outcome: Acknowledged | Sent | MotherError) -> None:
+        def done(outcome: Outcome) -> None:
             if future.done():
                 return  # the caller was cancelled while the packet was on its way
             if isinstance(outcome, MotherError):
