@@ -10,7 +10,7 @@ import pytest
 from sacbus import Mother
 from sacbus.kernel import SECOND
 from sacbus.mother import BadRequest, LineLost, NoAnswer
-from sacbus.mother.calibrate import RPMS, NoSoftOp, calibrate
+from sacbus.mother.calibration import RPMS, NoSoftOp, calibrate
 from sacbus.motion import Drive
 from sacbus.testing import VirtualBus
 
