@@ -47,6 +47,7 @@ GIVEN = {
     "monitor": ["/nonexistent"],
     "plan": ["m400"],
     "queue": ["get", "/nonexistent", "/nonexistent/queue.csv"],
+    "calibrate": ["/nonexistent", "10"],
     "check": ["/nonexistent"],
     "eeprom": ["show", "/nonexistent"],
     "kinds": [],
