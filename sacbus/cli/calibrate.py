@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sacbus.mother import Calibration
     from sacbus.motion import Drive
 
-__all__ = ["calibrate_command"]
+__all__ = ["calibrate_command", "result_lines"]
 
 #: Parts of the bar.
 _PARTS: Final = 1_000
@@ -88,7 +88,7 @@ def calibrate_command(
     if as_json:
         click.echo(json.dumps(_report(found)))
     else:
-        click.echo("\n".join(_lines(found, drive)))
+        click.echo("\n".join(result_lines(found, drive)))
     return 0
 
 
@@ -131,7 +131,8 @@ def _report(found: Calibration) -> dict[str, object]:
     }
 
 
-def _lines(found: Calibration, drive: Drive) -> list[str]:
+def result_lines(found: Calibration, drive: Drive) -> list[str]:
+    """What was found, for people, with what to send; ``drive`` has the settings as they are."""
     second = 1_000_000_000
     what = f"node {found.node}: {found.steps} steps at {found.rpm} RPM"
     lines = [
