@@ -51,13 +51,16 @@ class Mother:
         unsent: Callable[[], int] | None = None,
         arrive: Callable[..., None] | None = None,
         gap: Ns = MOTHER_GAP,
+        set_dtr: Callable[..., bool] | None = None,
     ) -> None:
         """Have ``send`` put bytes on a line, with ``slack`` for answers beyond the line's figures.
 
         ``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a host's,
         when mother sits on a bus in this process. ``gap`` as :class:`Caller` has it.
+        ``set_dtr(asserted=…)`` sets the DTR output of her adapter, and tells whether it has one.
         """
         self._clock = clock
+        self._set_dtr = set_dtr
         self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent, gap=gap)
         self._arrive = arrive or _call
         #: Those who wait for a time by mother's clock.
@@ -77,7 +80,14 @@ class Mother:
         """
         clock = LoopClock(asyncio.get_running_loop())
         async with open_line(link, baud) as line:
-            mother = cls(clock, line.send, rate=LineRate(baud), slack=LINK_SLACK, gap=gap)
+            mother = cls(
+                clock,
+                line.send,
+                rate=LineRate(baud),
+                slack=LINK_SLACK,
+                gap=gap,
+                set_dtr=line.set_dtr,
+            )
             line.start(mother.hear, mother.lose)
             try:
                 yield mother
@@ -143,6 +153,23 @@ class Mother:
     async def broadcast(self, line: str | bytes) -> None:
         """Send a line to all nodes; returns when the next packet may follow. Nobody answers."""
         await self._outcome(lambda done: self._caller.broadcast(_bytes(line), done))
+
+    def set_dtr(self, *, asserted: bool) -> None:
+        """Set DTR, an output of a serial adapter that RS485 leaves to other uses, now.
+
+        It may drive the nodes' shared sync line: as adapters with TTL levels have it, asserted is
+        low. Every serial port asserts it when it is opened, so it has to be let go first. Many
+        boards reset at its edge if it is wired to them. :class:`BadRequest` where there is none.
+        """
+        if self._set_dtr is None or not self._set_dtr(asserted=asserted):
+            raise BadRequest(
+                "this line has no DTR to set, use a serial port that has one, or another release"
+            )
+
+    def pull_dtr(self) -> None:
+        """Assert DTR and let it go: an edge and back, for ``release`` of a group's start."""
+        self.set_dtr(asserted=True)
+        self.set_dtr(asserted=False)
 
     def group(
         self, axes: Mapping[str, int | Member] | None = None, /, **named: int | Member

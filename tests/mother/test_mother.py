@@ -316,6 +316,31 @@ def test_a_line_that_hangs_up_fails_what_waits_and_what_comes_later() -> None:
         on_a_line(other, play)
 
 
+def test_a_line_without_dtr_says_so() -> None:
+    async def tcp() -> None:
+        server = await asyncio.start_server(lambda _reader, writer: writer.close(), "127.0.0.1", 0)
+        async with server:
+            port = server.sockets[0].getsockname()[1]
+            async with Mother.connect(f"socket://127.0.0.1:{port}") as mother:
+                with pytest.raises(BadRequest, match="this line has no DTR to set"):
+                    mother.pull_dtr()
+
+    asyncio.run(tcp())
+    with peer() as other:  # a pty has none either
+
+        async def play(mother: Mother) -> None:
+            with pytest.raises(BadRequest, match="this line has no DTR to set"):
+                mother.set_dtr(asserted=True)
+
+        on_a_line(other, play)
+
+    async def hosted(_bus: HostedBus, mother: Mother) -> None:
+        with pytest.raises(BadRequest, match="this line has no DTR to set"):
+            mother.pull_dtr()
+
+    virtually(hosted)
+
+
 def test_a_call_that_outlives_the_connection_is_told() -> None:
     async def scene(other: Peer) -> None:
         other.listen()
