@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Final
 from sacbus.kernel import SECOND, US, Ns
 from sacbus.language import NO_RAMP, Defaults, Motion, Move, Session, ThrowAway
 from sacbus.mother.caller import SoftOpHeard
-from sacbus.mother.errors import BadRequest, MotherError
+from sacbus.mother.errors import BadRequest, MotherError, Stopped
 from sacbus.motion import TICKS_PER_US, Drive, plan
 
 if TYPE_CHECKING:
@@ -124,6 +124,7 @@ async def calibrate(
     listeners = mother.caller.soft_op_listeners
     listeners.append(heard.take)
     switch_back = f"$O{int(soft_ops_after)}"
+    stops = mother.caller.stops
     try:
         await mother.send(node, "$O1")
         await mother.send(node, line)
@@ -131,6 +132,8 @@ async def calibrate(
         part = None if progress is None else _Part(progress, begun, planned)
         patience = planned + planned // _OFF + _LATE
         ended = await _within(patience, mother, heard.end, "end", node, part)
+        if mother.caller.stops != stops:
+            raise Stopped(0, "")  # the end that was told of was that
     except BaseException:
         # What went wrong is worth telling, not what more goes wrong because of it.
         with suppress(MotherError):

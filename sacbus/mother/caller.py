@@ -140,6 +140,8 @@ class Caller:
         self.overheard = 0
         self.strays = 0
         self.faults = 0
+        #: Emergency stops so far: who is in the middle of several calls sees by it that one came.
+        self.stops = 0
         #: Called with each soft op of a node's. Empty it is no more than counted.
         self.soft_op_listeners: list[Callable[[SoftOpHeard], object]] = []
         #: Called with the node of each answer to mother that nobody waits for.
@@ -211,6 +213,7 @@ class Caller:
         if self._lost is not None:
             done(self._lost)
             return
+        self.stops += 1
         self._stopping.append(done)
         if self._stop is None:
             self._stop = EmergencyStop(

@@ -91,17 +91,17 @@ class NotStarted(MotherError):
 class Stopped(MotherError):
     """An emergency stop came while this waited for its turn: it has not been sent, and will not be.
 
-    ``node`` is 0 for a broadcast.
+    ``node`` is 0 for a broadcast. Without a ``line``: what was waited for is not going to happen.
     """
 
     def __init__(self, node: int, line: str) -> None:
         self.node = node
         self.line = line
         whom = f"node {node}" if node else "all nodes"
-        super().__init__(
-            f"{whom}: {line!r} was not sent: an emergency stop came first; send it again once the "
-            "machine may move"
-        )
+        told = f"{whom}: {line!r} was not sent: an emergency stop came first; send it again"
+        if not line:
+            told = "an emergency stop came before the motion was over; begin again"
+        super().__init__(f"{told} once the machine may move")
 
 
 class LineLost(MotherError, ConnectionError):

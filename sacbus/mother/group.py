@@ -19,7 +19,7 @@ from sacbus.kernel import US, Ns
 from sacbus.language import QUEUE_LENGTH, Defaults, Motion, Move, RunPosition, Session, parse
 from sacbus.language.line import quoted
 from sacbus.mother.edits import edit_lines
-from sacbus.mother.errors import BadRequest
+from sacbus.mother.errors import BadRequest, Stopped
 from sacbus.mother.mother import Mother
 from sacbus.mother.release import Release, Share, stand_down, start_together
 from sacbus.mother.request import checked_address
@@ -73,6 +73,7 @@ class GroupRun:
         self, mother: Mother, motions: Mapping[str, GroupMotion], release: Release, drift_ppm: int
     ) -> None:
         self._mother = mother
+        self._stops = mother.caller.stops
         self.motions: Final = motions
         #: When they were released, by mother's clock.
         self.release: Final = release
@@ -86,7 +87,12 @@ class GroupRun:
         return self._mother.now >= self.over_at
 
     async def wait(self) -> None:
-        """Wait until the planned time has passed; who is cancelled meanwhile stops nothing."""
+        """Wait until the planned time has passed; who is cancelled meanwhile stops nothing.
+
+        :class:`Stopped` when an emergency stop came before.
+        """
+        if self._mother.caller.stops != self._stops:
+            raise Stopped(0, "")
         await self._mother.until(self.over_at)
 
 

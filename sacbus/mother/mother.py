@@ -17,7 +17,7 @@ from sacbus.language.line import quoted, short
 from sacbus.links import open_line
 from sacbus.mother.caller import SLACK, Caller
 from sacbus.mother.clock import Clock, LoopClock
-from sacbus.mother.errors import BadRequest, MotherError
+from sacbus.mother.errors import BadRequest, MotherError, Stopped
 from sacbus.mother.outcome import Acknowledged, Done, Outcome, Sent
 from sacbus.mother.scan import EVERY_ADDRESS, ScanProgress, scan
 from sacbus.mother.statistics import NodeStatistics
@@ -123,7 +123,10 @@ class Mother:
         return self._clock.now
 
     async def until(self, when: Ns) -> None:
-        """Wait until mother's clock shows ``when``; :class:`LineLost` if the line goes before."""
+        """Wait until mother's clock shows ``when``, for motion that is planned to be over then.
+
+        :class:`LineLost` if the line goes before, :class:`Stopped` upon an emergency stop.
+        """
         if self._caller.lost is not None:
             raise self._caller.lost
         sleeper: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -193,6 +196,9 @@ class Mother:
         before. Nobody answers a broadcast, so who has stopped is for the caller to find out.
         :class:`LineLost` when there is no line.
         """
+        for sleeper in self._sleepers:
+            if not sleeper.done():
+                sleeper.set_exception(Stopped(0, ""))
         await self._outcome(self._caller.estop)
 
     async def scan(

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Final
 from sacbus.kernel import SECOND, Ns
 from sacbus.language import QUEUE_LENGTH, Defaults, LoopFinish, LoopStart, Motion
 from sacbus.mother.edits import edit_lines, hold_line
-from sacbus.mother.errors import BadRequest, MotherError
+from sacbus.mother.errors import BadRequest, MotherError, Stopped
 from sacbus.mother.queue_file import RowRefused
 from sacbus.mother.request import checked_address
 from sacbus.mother.timeline import (
@@ -127,6 +127,8 @@ class QueueStream:
         self.pauses = 0
         #: In which row it was stopped before its end; None as long as it was not.
         self._stopped_in: int | None = None
+        #: Emergency stops before it began.
+        self._stops = 0
         self._progress: Callable[[int], object] | None = None
 
     @property
@@ -166,9 +168,11 @@ class QueueStream:
 
         Whatever ends it early, a cancelled call too, the node is stopped with S where it is, and
         :attr:`row` tells in which row. Raises :class:`RowRefused` at one that cannot be streamed,
-        :class:`LostTrack`, and what :meth:`Mother.send` does.
+        :class:`LostTrack`, :class:`Stopped` upon an emergency stop, and what :meth:`Mother.send`
+        does.
         """
         self._progress = progress
+        self._stops = self._mother.caller.stops
         rows = self._planned(motions)
         try:
             await self._send("S")
@@ -181,7 +185,7 @@ class QueueStream:
             self._stopped_in = self.row
             # What went wrong is worth telling, not what more goes wrong because of it.
             with suppress(MotherError):
-                await self._send("S")
+                await self._mother.send(self.node, "S")
             raise
 
     def _planned(self, motions: Iterable[Motion]) -> Iterator[Motion]:
@@ -317,4 +321,6 @@ class QueueStream:
             self._progress(self.done)
 
     async def _send(self, line: str) -> None:
+        if self._mother.caller.stops != self._stops:
+            raise Stopped(self.node, line)
         await self._mother.send(self.node, line)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from sacbus.kernel import Ns
-from sacbus.mother.errors import MotherError, NotStarted, Refused
+from sacbus.mother.errors import MotherError, NotStarted, Refused, Stopped
 from sacbus.mother.mother import Mother
 
 __all__ = [
@@ -73,16 +73,20 @@ async def start_together(
     ``release`` does it in place of the broadcast: by the shared sync line, say. All are loaded
     before the first is held. :class:`NotStarted` when a node fails: then none has started, and
     those that may be held have been sent ``S``; so they have when the call is cancelled, or when
-    ``release`` raises, whose error is then passed on as it is.
+    ``release`` raises, whose error is then passed on as it is. An emergency stop in the middle is
+    a failure, too.
     """
     held: list[int] = []
+    stops = mother.caller.stops
     try:
         for share in shares:
-            await _tell(mother, share.node, share.load)
+            await _tell(mother, share.node, share.load, stops)
         for share in shares:
             # Before the outcome is known: silence leaves open whether it is held.
             held.append(share.node)
-            await _tell(mother, share.node, share.hold, accept_duplicates=True)
+            await _tell(mother, share.node, share.hold, stops, accept_duplicates=True)
+        if mother.caller.stops != stops:
+            raise _Failed(shares[-1].node, Stopped(0, RELEASE))
     except _Failed as failed:
         still_held = await stand_down(mother, held)
         if isinstance(failed.cause, Refused):  # who says NAK has not acted
@@ -121,10 +125,12 @@ class _Failed(Exception):
 
 
 async def _tell(
-    mother: Mother, node: int, lines: Sequence[str], *, accept_duplicates: bool = False
+    mother: Mother, node: int, lines: Sequence[str], stops: int, *, accept_duplicates: bool = False
 ) -> None:
     for line in lines:
         try:
+            if mother.caller.stops != stops:
+                raise Stopped(node, line)
             await mother.send(node, line, accept_duplicates=accept_duplicates)
         except MotherError as cause:
             raise _Failed(node, cause) from cause

@@ -9,7 +9,7 @@ import pytest
 
 from sacbus import Mother
 from sacbus.kernel import SECOND
-from sacbus.mother import BadRequest, LineLost, NoAnswer
+from sacbus.mother import BadRequest, LineLost, NoAnswer, Stopped
 from sacbus.mother.calibration import RPMS, NoSoftOp, calibrate
 from sacbus.motion import Drive
 from sacbus.testing import VirtualBus
@@ -168,3 +168,11 @@ async def test_a_line_that_goes_meanwhile_is_told(bus: VirtualBus, mother: Mothe
 async def test_nothing_to_time_is_refused(mother: Mother, rpm: int, seconds: float) -> None:
     with pytest.raises(BadRequest, match="expected 1 RPM and one step at least"):
         await calibrate(mother, 10, rpm=rpm, seconds=seconds)
+
+
+async def test_an_emergency_stop_ends_it(bus: VirtualBus, mother: Mother) -> None:
+    call = asyncio.create_task(calibrate(mother, 10))
+    await asyncio.sleep(20)
+    await mother.estop()
+    with pytest.raises(Stopped, match="an emergency stop came before the motion was over"):
+        await call

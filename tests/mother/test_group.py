@@ -15,7 +15,7 @@ from sacbus.bus.passage import Passage
 from sacbus.kernel import MS, SECOND, US
 from sacbus.language import Motion
 from sacbus.language.queue_screen import QueueScreen
-from sacbus.mother import BadRequest, Member, NoAnswer, NotStarted, Refused
+from sacbus.mother import BadRequest, Member, MotherError, NoAnswer, NotStarted, Refused, Stopped
 from sacbus.motion import Drive, plan
 from sacbus.testing import VirtualBus
 
@@ -253,6 +253,33 @@ async def test_a_group_can_be_stopped(bus: VirtualBus, mother: Mother) -> None:
     with pytest.raises(NoAnswer, match="node 11: 'S'"):
         await group.stop()
     assert [node.state for node in bus.nodes.values()] == ["STANDBY", "OFF", "STANDBY"]
+
+
+@pytest.mark.parametrize("moment", [0.001, 0.01, 0.02, 0.03, 0.034, 0.0365, 0.039])
+async def test_an_emergency_stop_before_the_release_lets_nobody_start(
+    bus: VirtualBus, mother: Mother, moment: float
+) -> None:
+    call = asyncio.create_task(mother.group(x=10, y=11, z=12).start(x=400, y=400, z=400))
+    await asyncio.sleep(moment)
+    await mother.estop()
+    # What it tells is what became of the call that was out then: its ACK may have met the S.
+    with pytest.raises(MotherError, match="nothing was started|an emergency stop came"):
+        await call
+    await mother.broadcast("y")
+    await asyncio.sleep(10)
+    assert [node.position for node in bus.nodes.values()] == [0, 0, 0]
+
+
+async def test_an_emergency_stop_ends_a_move(bus: VirtualBus, mother: Mother) -> None:
+    run = await mother.group(x=10, y=11).start(x=4_000, y=4_000)
+    waiting = asyncio.create_task(run.wait())
+    await asyncio.sleep(1)
+    await mother.estop()
+    with pytest.raises(Stopped, match="came before the motion was over; begin again"):
+        await waiting
+    with pytest.raises(Stopped):
+        await run.wait()
+    assert [bus.node(node).state for node in (10, 11)] == ["STANDBY", "STANDBY"]
 
 
 @pytest.mark.sacbus(nodes={10: {"ustep": 3, "sprf": 400, "slow": 30, "ihd": 20}})

@@ -16,7 +16,7 @@ from sacbus.bus import Transmission
 from sacbus.kernel import MS, SECOND
 from sacbus.language import Motion, Session, parse
 from sacbus.language.commands import Move
-from sacbus.mother import LineLost, NoAnswer
+from sacbus.mother import LineLost, NoAnswer, Stopped
 from sacbus.mother.queue_file import RowRefused
 from sacbus.mother.queue_stream import LostTrack, QueueStream
 from sacbus.motion import REST, Drive, Left, begin, plan
@@ -338,3 +338,18 @@ async def test_what_the_node_did_before_is_stopped_and_its_soft_ops_are_off(
     assert bus.node(10).position - stood < 2_000
     assert "soft_ops       0" in bus.node(10).type("cf\r")
     assert bus.now < 60 * SECOND
+
+
+async def test_an_emergency_stop_ends_it_and_nothing_goes_on(
+    bus: VirtualBus, mother: Mother
+) -> None:
+    stream = QueueStream(mother, 10)
+    call = asyncio.create_task(stream.run([motion("m100v300a999d999")] * 200))
+    await bus.reached(lambda: bus.node(10).position >= 4_250, within="60 s")
+    await mother.estop()
+    with pytest.raises(Stopped, match="an emergency stop"):
+        await call
+    stood = bus.node(10).position
+    await asyncio.sleep(60)
+    assert bus.node(10).position == stood
+    assert stream.row == 43
