@@ -8,6 +8,9 @@ MotherError                        everything below
 ├── NotStarted                     of several that were to start together, none has
 ├── Stopped                        an emergency stop came before its turn; never sent
 └── LineLost (ConnectionError)     the link is gone
+
+What only one file raises is there: NoSoftOp (calibration), LostTrack (queue streams), and of
+BadRequest RowRefused (queue files) and NotStreamable.
 """
 
 from __future__ import annotations

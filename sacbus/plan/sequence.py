@@ -1,8 +1,8 @@
 """Commands in sequence: what each leaves to the next, and when each begins.
 
 Owns the walk through the entries (session defaults carried on, loops) and the survey of it. All
-figures of a command, and how it begins after another, come from ``sacbus.motion``. Nothing is kept but
-what the next command needs, so a sequence may be of any length.
+figures of a command, and how it begins after another, come from ``sacbus.motion``. Nothing is kept
+but what the next command needs, so a sequence may be of any length.
 """
 
 from __future__ import annotations

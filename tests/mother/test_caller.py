@@ -475,3 +475,17 @@ def test_no_answer_is_late_while_the_packet_still_waits_for_the_line() -> None:
     (outcome,) = outcomes
     assert isinstance(outcome, Acknowledged)
     assert outcome.attempts == 1
+
+
+@pytest.mark.parametrize("body", [b"m400", b"q30m4294967295vc4294967295a10.47d1l0u0"])
+def test_the_longest_call_is_one_that_fails_to_its_end(body: bytes) -> None:
+    rig = Rig(10)
+    rig.expect([packet_lost, packet_lost, packet_lost])
+    began = rig.kernel.now
+    outcomes = rig.call(10, body, accept_duplicates=True)
+    while not outcomes:
+        rig.kernel.run_next()
+    took = rig.kernel.now - began
+    assert isinstance(outcomes[0], NoAnswer)
+    # It has a pause before it, one after each answer, and a space for its CRC to spare.
+    assert took < rig.caller.longest_call(len(body)) < took + 8 * MS

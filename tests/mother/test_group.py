@@ -5,16 +5,20 @@ from __future__ import annotations
 import asyncio
 import itertools
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import ClassVar
 
 import pytest
 
-from sacbus import Mother
+from sacbus import Mother, open_bus
 from sacbus.bus.fault import FaultOn, Strike
 from sacbus.bus.passage import Passage
+from sacbus.daemon import Configuration
 from sacbus.kernel import MS, SECOND, US
 from sacbus.language import Motion
 from sacbus.language.queue_screen import QueueScreen
+from sacbus.links.places import PtyAt
 from sacbus.mother import BadRequest, Member, MotherError, NoAnswer, NotStarted, Refused, Stopped
 from sacbus.motion import Drive, plan
 from sacbus.testing import VirtualBus
@@ -263,7 +267,7 @@ async def test_an_emergency_stop_before_the_release_lets_nobody_start(
     await asyncio.sleep(moment)
     await mother.estop()
     # What it tells is what became of the call that was out then: its ACK may have met the S.
-    with pytest.raises(MotherError, match="nothing was started|an emergency stop came"):
+    with pytest.raises(MotherError, match=r"nothing was started|an emergency stop came"):
         await call
     await mother.broadcast("y")
     await asyncio.sleep(10)
@@ -347,6 +351,32 @@ async def test_on_a_common_clock_they_stay_together(bus: VirtualBus, mother: Mot
     await group.move(x="m200v60t1000000", y="m200v60t1000000")
     x, y = (bus.track(node).pulses(later, bus.now) for node in (10, 11))
     assert y[0] - x[0] == pytest.approx(500 * US, rel=1e-3)
+
+
+# ------------------------------------------------------------------------- in real time
+
+
+@pytest.mark.slow
+async def test_over_a_pty_in_real_time_it_is_the_same(tmp_path: Path) -> None:
+    nodes = (10, 11, 12)
+    configuration = Configuration(nodes=nodes, links=(PtyAt(tmp_path / "line"),))
+    async with open_bus(configuration) as hosted:
+        begun: dict[int, int] = {}
+
+        def note(node: int, pin: str, level: int, when: int) -> None:
+            if (pin, level) == ("op_sa", 1):
+                begun[node] = when
+
+        for node in nodes:
+            hosted.panel(node).watch(partial(note, node))
+        async with Mother.connect(str(tmp_path / "line")) as mother:
+            group = mother.group(x=10, y=11, z=12)
+            run = await group.move(x="m20v120", y="m-20v120", z="m20v120t100000")
+        assert [one.position_steps for one in hosted.snapshots()] == [20, -20, 20]
+        assert [one.state for one in hosted.snapshots()] == ["STANDBY"] * 3
+        assert begun[11] == begun[10]
+        assert begun[12] - begun[10] == 100 * MS
+        assert run.done
 
 
 # ------------------------------------------------------------------- what cannot be asked
