@@ -49,6 +49,8 @@ GIVEN = {
     "queue": ["get", "/nonexistent", "/nonexistent/queue.csv"],
     "calibrate": ["/nonexistent", "10"],
     "check": ["/nonexistent"],
+    "scan": ["/nonexistent"],
+    "estop": ["/nonexistent"],
     "eeprom": ["show", "/nonexistent"],
     "kinds": [],
     "run": ["/nonexistent.toml"],

@@ -126,6 +126,8 @@ class Caller:
         #: appointment of one before.
         self._due: Ns = 0
         self._look_at: Ns | None = None
+        #: When an answer is due by the line's own figures, after how long, by the body's size.
+        self._expected: dict[int, Ns] = {}
         #: Nodes that were given up before all of the slack was over, and when that is.
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
@@ -312,7 +314,6 @@ class Caller:
         request.attempts += 1
         clock = self._clock
         request.sent_at = now = clock.now
-        line_time = self._rate.span(len(request.data))
         statistics = self.statistics[request.node]
         statistics.sent += 1
         if request.attempts > 1:
@@ -320,6 +321,7 @@ class Caller:
         if request.node == GENERAL_CALL:
             self._pausing = True
             self._broadcasting = request
+            line_time = self._rate.span(len(request.data))
             clock.at(now + line_time + self._gap, self._broadcast_over)
         else:
             self._outstanding = request
@@ -346,11 +348,11 @@ class Caller:
             return
         self._outstanding = None
         statistics = self.statistics[request.node]
-        self._pause()
         if answer.accepted:
             round_trip = self._clock.now - request.sent_at
             statistics.acks += 1
             statistics.round_trips.append(round_trip)
+            self._pause()
             request.done(Acknowledged(request.node, request.attempts, round_trip))
             return
         statistics.naks += 1
@@ -358,7 +360,9 @@ class Caller:
         request.refusals += 1
         if request.attempts < request.tries and not request.withdrawn:
             self._waiting.appendleft(request)
+            self._pause()
         else:
+            self._pause()
             request.done(self._failure(request))
 
     def _look(self) -> None:
@@ -384,16 +388,20 @@ class Caller:
 
         For a line of ``body`` bytes; on a line that takes at once what it is given.
         """
-        attempt = self._patience_of(body + _PADDING, self._slack) + self._gap
+        attempt = self._line_time(body + _PADDING) + self._slack + self._gap
         return self._gap + self._tries * attempt
 
     def _patience(self, request: _Request) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
-        return self._patience_of(len(request.body), request.slack)
+        return self._line_time(len(request.body)) + request.slack
 
-    def _patience_of(self, body: int, slack: Ns) -> Ns:
-        answer = turnaround(body, nul_follows=True) + self._rate.span(ANSWER_BYTES)
-        return self._rate.span(body + FRAME_BYTES) + answer + slack
+    def _line_time(self, body: int) -> Ns:
+        """From the first bit of a packet to the last of its answer, by the line's own figures."""
+        known = self._expected.get(body)
+        if known is None:
+            answer = turnaround(body, nul_follows=True) + self._rate.span(ANSWER_BYTES)
+            known = self._expected[body] = self._rate.span(body + FRAME_BYTES) + answer
+        return known
 
     def _silent(self, request: _Request) -> None:
         self._outstanding = None
@@ -409,9 +417,12 @@ class Caller:
         self._next()
 
     def _pause(self) -> None:
-        """Leave the node the time in which it is deaf."""
-        self._pausing = True
-        self._clock.at(self._clock.now + self._gap, self._pause_over)
+        """Leave the node the time in which it is deaf, then go on."""
+        if self._gap:
+            self._pausing = True
+            self._clock.at(self._clock.now + self._gap, self._pause_over)
+        else:
+            self._next()
 
     def _pause_over(self) -> None:
         self._pausing = False

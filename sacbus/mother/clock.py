@@ -1,17 +1,16 @@
-"""The time that transactions go by: the kernel's, or an event loop's.
+"""The time that transactions go by: what they ask of a clock.
 
-Owns what they ask of a clock; a :class:`~sacbus.kernel.Kernel` is one as it is.
+A :class:`~sacbus.kernel.Kernel` is one as it is; that of an event loop is in ``loop.py``.
 """
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable
 from typing import Protocol as Contract
 
-from sacbus.kernel import SECOND, Ns
+from sacbus.kernel import Ns
 
-__all__ = ["Clock", "LoopClock"]
+__all__ = ["Clock"]
 
 
 class Clock(Contract):
@@ -25,21 +24,3 @@ class Clock(Contract):
     def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
         """Call back then."""
         ...
-
-
-class LoopClock:
-    """An event loop's clock for :class:`Caller`: ns since this object was made."""
-
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self._start = loop.time()
-
-    @property
-    def now(self) -> Ns:
-        """Ns since the start."""
-        # Rounded: a timer that fires at its very time must not find itself a nanosecond early.
-        return round((self._loop.time() - self._start) * SECOND)
-
-    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
-        """Call back then; gives the loop's timer handle."""
-        return self._loop.call_at(self._start + when / SECOND, callback, *arguments)

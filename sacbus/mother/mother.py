@@ -16,8 +16,9 @@ from sacbus.kernel import MS, LineRate, Ns
 from sacbus.language.line import quoted, short
 from sacbus.links import open_line
 from sacbus.mother.caller import SLACK, Caller
-from sacbus.mother.clock import Clock, LoopClock
+from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, MotherError, Stopped
+from sacbus.mother.loop import LoopClock
 from sacbus.mother.outcome import Acknowledged, Done, Outcome, Sent
 from sacbus.mother.scan import EVERY_ADDRESS, ScanProgress, scan
 from sacbus.mother.statistics import NodeStatistics
