@@ -258,6 +258,28 @@ def test_ctrl_c_stops_the_node_and_says_in_which_row(tmp_path: Path) -> None:
     asyncio.run(scene())
 
 
+def test_a_node_that_dies_is_told_with_the_row_it_was_in(tmp_path: Path) -> None:
+    file = tmp_path / "long.csv"
+    file.write_text(rows_of(200, STEADY), newline="")
+
+    async def scene() -> None:
+        async with bus_and_command(tmp_path, "queue", "put", "LINK", "10", str(file)) as (
+            bus,
+            command,
+        ):
+            await reached(lambda: bus.snapshot(10).position_steps > 80)
+            bus.panel(10).power(on=False)
+            async with asyncio.timeout(PATIENCE):
+                out, err = await command.communicate()
+            where, error = err.decode().splitlines()
+            assert where.startswith(f"node 10 was, as far as is known, at {file} line ")
+            assert where.endswith(" of 200")
+            assert error.startswith("error: node 10: 'q")
+            assert (command.returncode, out) == (4, b"")
+
+    asyncio.run(scene())
+
+
 def test_a_terminal_is_shown_how_many_rows_are_done(tmp_path: Path) -> None:
     file = tmp_path / "long.csv"
     file.write_text(rows_of(31, STEADY), newline="")

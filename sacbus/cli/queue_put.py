@@ -134,7 +134,7 @@ def _put(wanted: _Wanted, *, save: bool) -> dict[str, object]:
 
 def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
     from sacbus.kernel import SECOND
-    from sacbus.mother import Mother, QueueStream
+    from sacbus.mother import Mother, MotherError, QueueStream
 
     at = 0
 
@@ -168,9 +168,18 @@ def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
         with shown_progress("running", wanted.rows.count) as progress:
             return asyncio.run(stream(progress))
     except KeyboardInterrupt:
-        where = f"{wanted.rows.where(at)}, row {at} of {wanted.rows.count}" if at else "the start"
-        click.echo(f"node {wanted.node} was stopped with S at {where}", err=True)
+        _tell_where(wanted, at, "was stopped with S at")
         raise
+    except MotherError:
+        _tell_where(wanted, at, "was, as far as is known, at")
+        raise
+
+
+def _tell_where(wanted: _Wanted, row: int, how: str) -> None:
+    """In which row the node was when it ended early; nothing if it had not begun."""
+    if row:
+        where = f"{wanted.rows.where(row)}, row {row} of {wanted.rows.count}"
+        click.echo(f"node {wanted.node} {how} {where}", err=True)
 
 
 def _words(node: int, report: dict[str, object]) -> str:

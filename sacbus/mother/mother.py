@@ -180,8 +180,9 @@ class Mother:
     ) -> Group:
         """Axes that start together: ``mother.group(x=10, y=11)``, or a mapping of names to nodes.
 
-        A :class:`Member` in place of a node's address tells its settings. :class:`BadRequest` for
-        two axes on one node, and what no node can be.
+        A :class:`Member` in place of a node's address tells its settings. :class:`Group` itself
+        takes another queue position, or drift. :class:`BadRequest` for two axes on one node, and
+        what no node can be.
         """
         from sacbus.mother.group import Group  # noqa: PLC0415 (it stands on this file)
 

@@ -20,6 +20,7 @@ from sacbus.mother import LineLost, NoAnswer, Stopped
 from sacbus.mother.queue_file import RowRefused
 from sacbus.mother.queue_stream import LostTrack, QueueStream
 from sacbus.motion import REST, Drive, Left, begin, plan
+from sacbus.node import Report, ReportKind
 from sacbus.testing import VirtualBus
 
 pytestmark = pytest.mark.asyncio
@@ -79,6 +80,8 @@ async def test_two_hundred_rows_run_as_they_are_planned(
     bus: VirtualBus, mother: Mother, kind: type
 ) -> None:
     rows = kind(200)
+    reports: list[Report] = []
+    bus.hosted.bus.report_watchers.append(reports.append)
     stream, pulses = await streamed(bus, mother, rows)
     expected, _end = planned(rows)
     # To the half microsecond: seamless where they should be, never idle, none lost, none twice.
@@ -86,7 +89,8 @@ async def test_two_hundred_rows_run_as_they_are_planned(
     assert (stream.written, stream.done, stream.row, stream.pauses) == (200, 200, 200, 0)
     assert bus.node(10).state == "STANDBY"
     assert bus.counts["timeouts"] == 0
-    assert not [one for one in bus.told() if "overrun" in one]
+    # What may be reported is that ramps are short, and turns quick: no overrun, nothing ignored.
+    assert {one.kind for one in reports} <= {ReportKind.WARNING}
 
 
 @pytest.mark.parametrize("count", [1, 2, 28, 29, 30, 31, 37, 38, 59, 60, 61])
