@@ -103,7 +103,7 @@ class Stopped(MotherError):
         whom = f"node {node}" if node else "all nodes"
         told = f"{whom}: {line!r} was not sent: an emergency stop came first; send it again"
         if not line:
-            told = "an emergency stop came before the motion was over; begin again"
+            told = "an emergency stop came first: the motion is not over; begin again"
         super().__init__(f"{told} once the machine may move")
 
 

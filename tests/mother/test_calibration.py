@@ -174,5 +174,5 @@ async def test_an_emergency_stop_ends_it(bus: VirtualBus, mother: Mother) -> Non
     call = asyncio.create_task(calibrate(mother, 10))
     await asyncio.sleep(20)
     await mother.estop()
-    with pytest.raises(Stopped, match="an emergency stop came before the motion was over"):
+    with pytest.raises(Stopped, match="an emergency stop came first: the motion is not over"):
         await call

@@ -279,7 +279,9 @@ async def test_an_emergency_stop_ends_a_move(bus: VirtualBus, mother: Mother) ->
     waiting = asyncio.create_task(run.wait())
     await asyncio.sleep(1)
     await mother.estop()
-    with pytest.raises(Stopped, match="came before the motion was over; begin again"):
+    with pytest.raises(
+        Stopped, match="an emergency stop came first: the motion is not over; begin again"
+    ):
         await waiting
     with pytest.raises(Stopped):
         await run.wait()
