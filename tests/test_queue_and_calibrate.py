@@ -155,6 +155,31 @@ def test_a_file_that_is_wrong_is_told_by_its_line_and_nothing_moves(
     assert capsys.readouterr() == ("", f"error: {told.format(file=file)}\n")
 
 
+def test_what_is_streamed_is_not_saved(sacbus: Sacbus, capsys: Captured, tmp_path: Path) -> None:
+    file = tmp_path / "long.csv"
+    file.write_text(rows_of(31, STEADY), newline="")
+    assert run(["queue", "put", sacbus.link, "12", str(file), "--save"]) == 2
+    assert capsys.readouterr().err.startswith("error: --save is for files that are not streamed")
+
+
+def test_rows_that_are_too_quick_for_a_link_are_told_of(capsys: Captured, tmp_path: Path) -> None:
+    file = tmp_path / "quick.csv"
+    # 3 ms each; what is sent over a link may take a tenth of a second.
+    file.write_text(rows_of(31, "1 , 0 , 1 , 100 , 3000 , 0 , 999 , 999 , 0 , 0 , 0"), newline="")
+    with served("--ephemeral") as real:
+        assert run(["queue", "put", real.link, "10", str(file)]) == 0
+        assert capsys.readouterr() == (
+            "node 10 has run 31 rows, 0.093 s\n",
+            (
+                "warning: node 10 paused once, since rows came too late; longer rows, or a quicker "
+                "line, run without a stop\n"
+            ),
+        )
+        assert real.send_signal(signal.SIGTERM) == 0
+        (bus,) = real.read_event("stopped")["buses"]
+        assert [node["position_steps"] for node in bus["nodes"]] == [31, 0, 0]
+
+
 def test_a_file_that_is_not_there_is_told(sacbus: Sacbus, capsys: Captured) -> None:
     assert run(["queue", "put", sacbus.link, "12", "/nonexistent.csv"]) == 2
     told = "the queue file cannot be read (No such file or directory), /nonexistent.csv, check the"

@@ -97,6 +97,13 @@ def put_command(link: str, node: int, file: str, **given: Any) -> int:  # noqa: 
             return told(failure)
         except RowRefused as fault:
             raise WrongInput(f"{fault.what}, {rows.where(fault.row)}, {fault.remedy}") from fault
+    if pauses := report.get("pauses"):
+        how_often = "once" if pauses == 1 else f"{pauses} times"
+        click.echo(
+            f"warning: node {node} paused {how_often}, since rows came too late; longer rows, or a "
+            "quicker line, run without a stop",
+            err=True,
+        )
     if given["as_json"]:
         click.echo(json.dumps({"link": link, "node": node, "file": file} | report))
     else:
@@ -187,10 +194,4 @@ def _words(node: int, report: dict[str, object]) -> str:
     if not report["streamed"]:
         saved = ", and saved to its EEPROM" if report["saved"] else ""
         return f"{rows} positions written to node {node}{saved}"
-    text = f"node {node} has run {rows} rows, {report['seconds']:.3f} s"
-    if report["pauses"]:
-        text += (
-            f"\nwarning: it paused {report['pauses']} times, since rows came too late; longer "
-            "rows, or a quicker line, run without a stop"
-        )
-    return text
+    return f"node {node} has run {rows} rows, {report['seconds']:.3f} s"

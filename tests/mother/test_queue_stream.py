@@ -120,7 +120,20 @@ async def test_long_rows_are_split_into_several_edits(bus: VirtualBus, mother: M
     long = replace(
         motion("m20v3000t3000000l1a10.47d10.47u255p"), cycle_us=123_457, rpm=2, steps=1_000
     )
-    rows = [replace(long, acc100=1_000 + n, dec100=2_000 - n, wait_us=n) for n in range(40)]
+    rows = [
+        replace(
+            long,
+            steps=1_000 + n,
+            cycle_us=123_400 + n,
+            acc100=1_001 + n,
+            dec100=2_099 - n,
+            linear=n // 30 % 2 == 0,
+            extra_pulses=100 + n,
+            wait_us=1_000_000 + n,
+            pulses=True,
+        )
+        for n in range(65)
+    ]
     _stream, pulses = await streamed(bus, mother, rows)
     assert pulses.tolist() == planned(rows)[0].tolist()
 
