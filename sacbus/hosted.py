@@ -7,7 +7,7 @@ the saving of the nodes' memory. How one is built is the daemon's business.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from functools import partial
 from random import Random
@@ -23,6 +23,7 @@ from sacbus.mother import Mother
 from sacbus.node import BOOT, Heard, Node, Report, ReportKind, Snapshot
 from sacbus.panel import Deed, Panel
 from sacbus.saving import AtOnce, Saving, Soon
+from sacbus.shared_line import SharedLine
 from sacbus.state import StateDirectory, StateError
 from sacbus.watchdog import Watchdog
 
@@ -85,6 +86,13 @@ class HostedBus:
     def panel(self, address: int) -> Panel:
         """A node's pins, encoder, switch and terminal; NoSuchNode when there is none."""
         return self._panel(self.bus.node(address))
+
+    def shared_line(self, pin: str, addresses: Iterable[int]) -> SharedLine:
+        """A wire to the same pin of these nodes: ``"sync"``, ``"xclk"``, ``"estop"``.
+
+        NoSuchNode when there is none of them.
+        """
+        return SharedLine(pin, [self.panel(address) for address in addresses], self.host)
 
     def fault(self, fault: Fault) -> FaultOn:
         """Put a fault on the line now; what is given counts it and takes it :meth:`off`.

@@ -14,6 +14,7 @@ import traceback
 import click
 
 from sacbus import __version__
+from sacbus.cli.calibrate import calibrate_command
 from sacbus.cli.check import check_command
 from sacbus.cli.diff import diff_command
 from sacbus.cli.dissector import dissector_command
@@ -61,6 +62,7 @@ for command in (
     run_command,
     plan_command,
     queue_group,
+    calibrate_command,
     export_command,
     diff_command,
     check_command,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from sacbus.kernel import MS, LineRate, Ns
@@ -22,6 +23,8 @@ from sacbus.mother.pending import Request
 from sacbus.mother.request import checked_address, safe_body
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
+    DC1,
+    DC2,
     GENERAL_CALL,
     MOTHER,
     Answer,
@@ -32,14 +35,35 @@ from sacbus.wire import (
 )
 from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
 
-__all__ = ["SLACK", "TRIES", "Caller"]
+__all__ = ["SLACK", "TRIES", "Caller", "SoftOpHeard"]
 
 #: How long an answer may be late beyond the line's own figures, on a line in this process, once
 #: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
 
+#: The bodies of soft ops.
+_SOFT_OPS: Final = (bytes((DC1,)), bytes((DC2,)))
+
+#: What makes a packet of a body: STX, two addresses, ETX, CRC, NUL.
+FRAME_BYTES: Final = 6
+
+#: The space that a body may need for its CRC.
+_PADDING: Final = 1
+
 #: Attempts for what may be repeated.
 TRIES: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class SoftOpHeard:
+    """A node tells everybody that a command of its begins (DC1) or has ended (DC2).
+
+    at: when mother had the whole packet, ns by her clock; always as long after the event itself.
+    """
+
+    node: int
+    begins: bool
+    at: Ns
 
 
 class Caller:
@@ -93,6 +117,10 @@ class Caller:
         self.overheard = 0
         self.strays = 0
         self.faults = 0
+        #: Emergency stops so far: who is in the middle of several calls sees by it that one came.
+        self.stops = 0
+        #: Called with each soft op of a node's. Empty it is no more than counted.
+        self.soft_op_listeners: list[Callable[[SoftOpHeard], object]] = []
         #: Called with the node of each answer to mother that nobody waits for.
         self.stray_watchers: list[Callable[[int], object]] = []
 
@@ -162,6 +190,7 @@ class Caller:
         if self._lost is not None:
             done(self._lost)
             return
+        self.stops += 1
         self._stopping.append(done)
         if self._stop is None:
             self._stop = EmergencyStop(
@@ -205,6 +234,8 @@ class Caller:
                 self.faults += 1
             elif type(event) is Packet and event.src != MOTHER:
                 self.overheard += 1
+                if self.soft_op_listeners and event.dest == GENERAL_CALL:
+                    self._soft_op(event)
 
     @property
     def lost(self) -> LineLost | None:
@@ -272,6 +303,13 @@ class Caller:
                 clock.at(self._due, self._look)
         self._send(request.data)
 
+    def _soft_op(self, packet: Packet) -> None:
+        if packet.body not in _SOFT_OPS:
+            return
+        heard = SoftOpHeard(packet.src, packet.body[0] == DC1, self._clock.now)
+        for listener in tuple(self.soft_op_listeners):
+            listener(heard)
+
     def _answered(self, answer: Answer) -> None:
         request = self._outstanding
         if request is None or answer.dest != MOTHER or answer.src != request.node:
@@ -317,14 +355,25 @@ class Caller:
         else:
             self._silent(request)
 
+    def longest_call(self, body: int) -> Ns:
+        """How long a call may take once it is its turn, if every attempt but the last fails.
+
+        For a line of ``body`` bytes; on a line that takes at once what it is given.
+        """
+        attempt = self._line_time(body + _PADDING) + self._slack + self._gap
+        return self._gap + self._tries * attempt
+
     def _patience(self, request: Request) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
-        size = len(request.body)
-        expected = self._expected.get(size)
-        if expected is None:
-            answer = turnaround(size, nul_follows=True) + self._rate.span(ANSWER_BYTES)
-            expected = self._expected[size] = self._rate.span(len(request.data)) + answer
-        return expected + request.slack
+        return self._line_time(len(request.body)) + request.slack
+
+    def _line_time(self, body: int) -> Ns:
+        """From the first bit of a packet to the last of its answer, by the line's own figures."""
+        known = self._expected.get(body)
+        if known is None:
+            answer = turnaround(body, nul_follows=True) + self._rate.span(ANSWER_BYTES)
+            known = self._expected[body] = self._rate.span(body + FRAME_BYTES) + answer
+        return known
 
     def _silent(self, request: Request) -> None:
         self._outstanding = None
