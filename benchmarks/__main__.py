@@ -8,7 +8,18 @@ import platform
 from collections.abc import Callable
 from dataclasses import asdict
 
-from benchmarks import bus, kernel, lateness, line, motion, pty, recording, tcp, wire
+from benchmarks import (
+    bus,
+    kernel,
+    lateness,
+    line,
+    motion,
+    pty,
+    recording,
+    tcp,
+    transactions,
+    wire,
+)
 from benchmarks.figure import Figure
 from sacbus.wire import CRC_IS_FAST
 
@@ -21,6 +32,7 @@ BENCHMARKS: dict[str, Callable[[int], list[Figure]]] = {
     "line": line.figures,
     "pty": pty.figures,
     "tcp": tcp.figures,
+    "transactions": transactions.figures,
     "lateness": lateness.figures,
 }
 
