@@ -3,10 +3,10 @@
     python examples/relief.py [LINES [FILE]]
 
 Writes a program of LINES lines, 120000 unless said otherwise, to FILE or to standard output: the
-tool goes to and fro over a surface of 80 by 60 mm, with a rosette in its middle that is raised up
-to 4 mm, in bands between which it is lifted. It needs axes X, Y and Z. The same number gives the
-same program, byte by byte. The status is 0 when it is written, 1 when FILE cannot be, 2 when LINES
-is no number of at least 1000.
+tool goes back and forth over a surface of 80 by 60 mm with a rosette in its middle, raised up to
+4 mm, in bands between which it is lifted. It needs axes X, Y and Z. The same number gives the same
+program, byte by byte. The status is 0 when it is written, 1 when FILE cannot be, 2 when LINES is no
+number of at least 1000.
 
     python examples/relief.py 120000 relief.ngc
     sacbus gcode relief.ngc --axis X=10:400 --axis Y=11:400 --axis Z=12:400
@@ -78,7 +78,7 @@ def program(lines: int) -> Iterator[str]:
 
 
 def surface(lines: int) -> Iterator[str]:
-    """The lines between, at least so many: rows to and fro, band by band, never the same twice."""
+    """The lines between, at least so many: rows back and forth, band by band."""
     # As far from point to point as from row to row, so that the points are shared out evenly.
     columns = max(4, round(math.sqrt(lines * WIDTH / HEIGHT)))
     rows = lines // columns + 1

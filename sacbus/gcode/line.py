@@ -73,7 +73,7 @@ class Line:
                 self._number(index, number)
             elif letter in AXIS_LETTERS:
                 what = f"the machine has no axis {letter}"
-                self._wrong(index, what, f"give it one, --axis {letter}=NODE:STEPS, or take it out")
+                self._wrong(index, what, f"give it one (--axis {letter}=NODE:STEPS) or take it out")
             else:
                 self._wrong(index, *why_refused(name_of(letter, number)))
 
@@ -87,7 +87,7 @@ class Line:
         if not number.isdigit():
             self._wrong(index, "a line number is a whole number without a sign", "write one")
         elif index:
-            self._wrong(index, "a line number stands at the beginning", "write it there")
+            self._wrong(index, "a line number begins its line", "write it there")
 
     def _wrong(self, index: int, what: str, remedy: str) -> None:
         self.mistakes.append(self._about(index, what, remedy))
@@ -112,7 +112,8 @@ def read_line(text: str, number: int, name: str, axes: Collection[str]) -> Line:
     line.read(axes)
     for flaw in flaws:
         line.flawed(flaw, flaw.at)
-    if end < len(body):
+    subprogram = any(letter == "O" for letter, _ in line.words)
+    if end < len(body) and not subprogram:  # its keywords are no words, and the O tells enough
         flaw = flaw_at(body, end)
-        line.flawed(flaw, column_of(text, end))
+        line.flawed(flaw, column_of(text, flaw.at))
     return line

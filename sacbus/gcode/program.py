@@ -81,7 +81,8 @@ class Program:
             text = text.replace("/", " ", 1)
         line = read_line(text, number, self._name, self._frame.axes)
         self._begun = self._begun or bool(line.words)
-        self._modes.take(line.codes)
+        if line.codes:
+            self._modes.take(line.codes)
         try:
             if line.mistakes:
                 raise GcodeError(line.mistakes)
@@ -190,6 +191,7 @@ class Program:
         named = frame.named(line)
         if motion is None:
             if named:
+                self._modes.motion = Motion.FEED  # told once, not for every line that follows
                 what = "no motion is in force"
                 raise line.mistake(named[0], what, "write G0, G1, G2 or G3 in this line or before")
             return ()

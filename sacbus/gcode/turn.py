@@ -60,7 +60,7 @@ def _axes_of_plane(line: Line, modes: Modes, frame: Frame, motion: Motion) -> tu
     for letter in (plane.first, plane.second):
         if letter not in frame.axes:
             what = f"an arc in this plane needs axis {letter}, which the machine does not have"
-            remedy = f"give it one, --axis {letter}=NODE:STEPS, or choose G17, G18 or G19"
+            remedy = f"give it one (--axis {letter}=NODE:STEPS) or choose G17, G18 or G19"
             raise line.mistake(motion.value, what, remedy)
     return frame.axes[plane.first], frame.axes[plane.second]
 

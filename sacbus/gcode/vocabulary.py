@@ -7,7 +7,7 @@ Source: RS274/NGC interpreter, version 3 (NISTIR 6556), "Modal Groups"; spec, mo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import Enum, auto
+from enum import IntEnum, auto
 from typing import Final
 
 __all__ = [
@@ -24,8 +24,10 @@ __all__ = [
 ]
 
 
-class Group(Enum):
+class Group(IntEnum):
     """Of the words of a group, a line has one at most."""
+
+    # IntEnum: its members are looked up in dictionaries for every line, and Enum hashes in Python.
 
     ONCE = auto()
     """What holds for its line alone (RS274: non-modal, group 0)."""

@@ -31,6 +31,8 @@ thousandth of a step (decision); line numbers and speeds have fewer."""
 _NUMBER = rf"[+-]?(?:[0-9]{{1,{DIGITS}}}(?:\.[0-9]*)?|\.[0-9]+)"
 _WORD: Final = re.compile(rf"([A-Z])({_NUMBER})")
 _WORDS: Final = re.compile(rf"(?:[A-Z]{_NUMBER})*")
+_BEGUN: Final = re.compile(r"[A-Z][+-]?(.?)", re.DOTALL)
+_LONG: Final = re.compile(rf"[A-Z][+-]?[0-9]{{{DIGITS}}}$")
 _MESSAGE: Final = re.compile(r"\s*M\s*S\s*G\s*,(.*)", re.IGNORECASE | re.DOTALL)
 
 
@@ -79,9 +81,9 @@ def uncommented(text: str) -> Uncommented:
             inner = at + 2 + comment.index("(")
             flaws.append(Flaw(inner, "(", "a comment within a comment", "take it out"))
         elif (message := _MESSAGE.match(comment)) is not None:
-            messages.append(" ".join(message[1].split()))
+            messages.append(_one_line(message[1]))
         at = end + 1
-    return Uncommented("".join(body), tuple(messages), tuple(flaws))
+    return Uncommented("".join(body), tuple(filter(None, messages)), tuple(flaws))
 
 
 def split_words(body: str) -> tuple[list[Word], int]:
@@ -110,21 +112,20 @@ def column_of(text: str, place: int) -> int:
 def flaw_at(body: str, place: int) -> Flaw:
     """Why no word can be read at ``place`` in a body."""
     rest = body[place:]
-    letter = rest[0]
-    number = re.match(r"[A-Z][+-]?(.?)", rest)
+    letter, number = rest[0], _BEGUN.match(rest)
+    after = number[1] if number is not None else ""
     if letter == "O":
         return Flaw(place, _shown(rest), "subprograms are not read", "have them written out")
-    if letter == "#" or (number is not None and number[1] == "#"):
+    if letter == "#" or after == "#":
         return Flaw(place, _shown(rest), "parameters are not read", "write the number itself")
-    if letter == "[" or (number is not None and number[1] == "["):
+    if letter == "[" or after == "[":
         return Flaw(place, _shown(rest), "expressions are not read", "write the number itself")
     if number is not None:
-        long = re.match(r"[A-Z][+-]?[0-9]", rest) is not None
-        what = "expected a number such as 10, -1.5 or .25"
-        return Flaw(place, _shown(rest), f"{what}, got {'another' if long else 'none'}", "write it")
-    if letter.isdigit() and place and body[place - 1].isdigit():
+        what = f"expected a number such as 10, -1.5 or .25, got {_shown(after) or 'none'}"
+        return Flaw(place, letter, what, "write one")
+    if (long := _LONG.search(body, 0, place)) is not None and letter.isdigit():
         what = f"more than {DIGITS} digits before the point"
-        return Flaw(place, _shown(rest), what, "write a number that a machine can reach")
+        return Flaw(long.start(), _shown(body[long.start() :]), what, "write fewer")
     if letter == ")":
         return Flaw(place, letter, "it closes no comment", "take it out")
     if letter == "/":
@@ -140,6 +141,11 @@ def _folded(character: str) -> str:
     if not character.isascii():
         return character
     return "" if character.isspace() else character.upper()
+
+
+def _one_line(text: str) -> str:
+    """A message for people: nothing in it moves a terminal's cursor."""
+    return "".join(one if one.isprintable() else "?" for one in " ".join(text.split()))
 
 
 def _shown(text: str) -> str:
