@@ -43,6 +43,7 @@ def from_centre(arc: Arc, place: tuple[float, ...]) -> float:
     return math.dist((place[1], place[3]), arc.centre)
 
 
+@pytest.mark.slow
 @given(arcs())
 def test_chords_stay_within_the_tolerance_and_end_on_the_arc(arc: Arc) -> None:
     straights = list(arc.straights())
@@ -67,6 +68,7 @@ def test_the_last_chord_ends_exactly_where_the_arc_does(arc: Arc) -> None:
     assert (last.feed, last.line) == (arc.feed, arc.line)
 
 
+@pytest.mark.slow
 @given(arcs())
 def test_chords_turn_the_way_of_the_arc_by_equal_parts(arc: Arc) -> None:
     places = [arc.start, *(straight.to for straight in arc.straights())]
@@ -76,6 +78,7 @@ def test_chords_turn_the_way_of_the_arc_by_equal_parts(arc: Arc) -> None:
         assert part == pytest.approx(arc.angle / arc.chords, abs=1e-6)
 
 
+@pytest.mark.slow
 @given(arcs())
 def test_the_other_axes_go_along_evenly(arc: Arc) -> None:
     for number, straight in enumerate(arc.straights(), 1):
@@ -84,6 +87,7 @@ def test_the_other_axes_go_along_evenly(arc: Arc) -> None:
             assert straight.to[axis] == pytest.approx(even, abs=1e-9)
 
 
+@pytest.mark.slow
 @given(arcs())
 def test_the_length_is_that_of_ever_finer_chords(arc: Arc) -> None:
     fine = Arc(arc.start, arc.to, arc.plane, arc.centre, arc.angle, 1e-5, None, 0)

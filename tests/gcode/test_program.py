@@ -238,6 +238,7 @@ def written(path: list[Straight], *, spaced: bool) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.slow
 @given(st.lists(moves, max_size=30), st.booleans())
 def test_a_path_that_is_written_and_read_is_the_same_path(
     drawn: list[tuple[tuple[float, float, float], float | None]], spaced: bool

@@ -37,6 +37,7 @@ def mistakes(program: list[str]) -> tuple[Mistake, ...]:
     return ()
 
 
+@pytest.mark.slow
 @given(st.lists(lines | st.text(), max_size=12))
 def test_whatever_is_written_is_read_or_refused(program: list[str]) -> None:
     if wrong := mistakes(program):
