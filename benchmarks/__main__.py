@@ -10,6 +10,7 @@ from dataclasses import asdict
 
 from benchmarks import (
     bus,
+    gcode,
     kernel,
     lateness,
     line,
@@ -27,6 +28,7 @@ BENCHMARKS: dict[str, Callable[[int], list[Figure]]] = {
     "wire": wire.figures,
     "kernel": kernel.figures,
     "motion": motion.figures,
+    "gcode": gcode.figures,
     "bus": bus.figures,
     "recording": recording.figures,
     "line": line.figures,
