@@ -10,27 +10,19 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from sacbus.kernel import MS, LineRate, Ns
 from sacbus.language import repeatable
 from sacbus.mother.clock import Clock
-from sacbus.mother.errors import (
-    LineLost,
-    MotherError,
-    NoAnswer,
-    Refused,
-    Stopped,
-    UnknownOutcome,
-)
+from sacbus.mother.errors import LineLost, MotherError
 from sacbus.mother.estop import EmergencyStop
 from sacbus.mother.outcome import Acknowledged, Done, Sent
+from sacbus.mother.pending import Request
 from sacbus.mother.request import checked_address, safe_body
+from sacbus.mother.soft_ops import SoftOpHeard, soft_op
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
-    DC1,
-    DC2,
     GENERAL_CALL,
     MOTHER,
     Answer,
@@ -41,14 +33,11 @@ from sacbus.wire import (
 )
 from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
 
-__all__ = ["SLACK", "TRIES", "Caller", "SoftOpHeard"]
+__all__ = ["SLACK", "TRIES", "Caller"]
 
 #: How long an answer may be late beyond the line's own figures, on a line in this process, once
 #: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
-
-#: The bodies of soft ops.
-_SOFT_OPS: Final = (bytes((DC1,)), bytes((DC2,)))
 
 #: What makes a packet of a body: STX, two addresses, ETX, CRC, NUL.
 FRAME_BYTES: Final = 6
@@ -58,37 +47,6 @@ _PADDING: Final = 1
 
 #: Attempts for what may be repeated.
 TRIES: Final = 3
-
-
-@dataclass(frozen=True, slots=True)
-class SoftOpHeard:
-    """A node tells everybody that a command of its begins (DC1) or has ended (DC2).
-
-    at: when mother had the whole packet, ns by her clock; always as long after the event itself.
-    """
-
-    node: int
-    begins: bool
-    at: Ns
-
-
-@dataclass(slots=True)
-class _Request:
-    node: int
-    body: bytes
-    data: bytes
-    done: Done
-    #: Whether it may run twice: the caller said so, or, as looked up at silence, the line may.
-    may_repeat: bool
-    tries: int
-    #: How late its answer may be.
-    slack: Ns
-    attempts: int = 0
-    refusals: int = 0
-    sent_at: Ns = 0
-    last: str = "none"
-    #: It is not to be sent again: nobody waits for it any more, or an emergency stop has come.
-    withdrawn: bool = False
 
 
 class Caller:
@@ -119,8 +77,8 @@ class Caller:
         self._tries = tries
         self._gap = gap
         self._receiver = PacketReceiver()
-        self._waiting: deque[_Request] = deque()
-        self._outstanding: _Request | None = None
+        self._waiting: deque[Request] = deque()
+        self._outstanding: Request | None = None
         #: When the outstanding request's answer is overdue, and for when the next look at it is
         #: appointed. Nearly all answers come in time, and nearly all requests do with the
         #: appointment of one before.
@@ -132,7 +90,7 @@ class Caller:
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
         self._pausing = False
-        self._broadcasting: _Request | None = None
+        self._broadcasting: Request | None = None
         #: The emergency stop that is under way, and who waits for its end.
         self._stop: EmergencyStop | None = None
         self._stopping: list[Done] = []
@@ -166,7 +124,7 @@ class Caller:
         checked_address(node)
         body = safe_body(line)
         self._enqueue(
-            _Request(
+            Request(
                 node,
                 body,
                 encode(node, MOTHER, body),
@@ -186,14 +144,14 @@ class Caller:
         checked_address(node)
         data = encode(node, MOTHER, b"")
         self._enqueue(
-            _Request(node, b"", data, done, may_repeat=True, tries=1, slack=min(slack, self._slack))
+            Request(node, b"", data, done, may_repeat=True, tries=1, slack=min(slack, self._slack))
         )
 
     def broadcast(self, line: bytes, done: Done) -> None:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
         body = safe_body(line)
         self._enqueue(
-            _Request(
+            Request(
                 GENERAL_CALL,
                 body,
                 encode(GENERAL_CALL, MOTHER, body),
@@ -235,10 +193,7 @@ class Caller:
         self._waiting.clear()
         # Only now, for those who are told may ask for more.
         for request in waiting:
-            if request.attempts:
-                request.done(self._failure(request))
-            else:
-                request.done(Stopped(request.node, _shown(request.body)))
+            request.done(request.failure())
 
     def withdraw(self, done: Done) -> None:
         """Nobody waits any more for the request of this ``done``.
@@ -262,8 +217,8 @@ class Caller:
                 self.faults += 1
             elif type(event) is Packet and event.src != MOTHER:
                 self.overheard += 1
-                if self.soft_op_listeners and event.dest == GENERAL_CALL:
-                    self._soft_op(event)
+                if self.soft_op_listeners:
+                    self._tell_soft_op(event)
 
     @property
     def lost(self) -> LineLost | None:
@@ -283,7 +238,7 @@ class Caller:
             if request is not None:
                 request.done(self._lost)
 
-    def _enqueue(self, request: _Request) -> None:
+    def _enqueue(self, request: Request) -> None:
         if self._lost is not None:
             request.done(self._lost)
             return
@@ -297,12 +252,12 @@ class Caller:
             and not self._pausing
             and self._waiting
             and self._stop is None
-            and not (self._unsettled and self._unsettled_is(self._waiting[0].node))
+            and not (self._unsettled and self._may_still_answer(self._waiting[0].node))
         ):
             self._attempt(self._waiting.popleft())
 
-    def _unsettled_is(self, node: int) -> bool:
-        """Whether an answer of ``node`` to a probe may still come; then it is waited for."""
+    def _may_still_answer(self, node: int) -> bool:
+        """Whether an answer of ``node`` to a probe may yet come; then it is waited for first."""
         until = self._unsettled.pop(node, 0)
         if until <= self._clock.now:
             return False
@@ -310,7 +265,7 @@ class Caller:
         self._clock.at(until, self._pause_over)
         return True
 
-    def _attempt(self, request: _Request) -> None:
+    def _attempt(self, request: Request) -> None:
         request.attempts += 1
         clock = self._clock
         request.sent_at = now = clock.now
@@ -331,12 +286,11 @@ class Caller:
                 clock.at(self._due, self._look)
         self._send(request.data)
 
-    def _soft_op(self, packet: Packet) -> None:
-        if packet.body not in _SOFT_OPS:
-            return
-        heard = SoftOpHeard(packet.src, packet.body[0] == DC1, self._clock.now)
-        for listener in tuple(self.soft_op_listeners):
-            listener(heard)
+    def _tell_soft_op(self, packet: Packet) -> None:
+        heard = soft_op(packet, self._clock.now)
+        if heard is not None:
+            for listener in tuple(self.soft_op_listeners):
+                listener(heard)
 
     def _answered(self, answer: Answer) -> None:
         request = self._outstanding
@@ -358,12 +312,12 @@ class Caller:
         statistics.naks += 1
         request.last = "NAK"
         request.refusals += 1
-        if request.attempts < request.tries and not request.withdrawn:
+        if request.again:
             self._waiting.appendleft(request)
             self._pause()
         else:
             self._pause()
-            request.done(self._failure(request))
+            request.done(request.failure())
 
     def _look(self) -> None:
         """See whether the answer that we wait for is overdue."""
@@ -391,7 +345,7 @@ class Caller:
         attempt = self._line_time(body + _PADDING) + self._slack + self._gap
         return self._gap + self._tries * attempt
 
-    def _patience(self, request: _Request) -> Ns:
+    def _patience(self, request: Request) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
         return self._line_time(len(request.body)) + request.slack
 
@@ -403,17 +357,17 @@ class Caller:
             known = self._expected[body] = self._rate.span(body + FRAME_BYTES) + answer
         return known
 
-    def _silent(self, request: _Request) -> None:
+    def _silent(self, request: Request) -> None:
         self._outstanding = None
         self.statistics[request.node].timeouts += 1
         request.last = "silence"
         request.may_repeat = request.may_repeat or repeatable(request.body)
         if request.slack < self._slack:
             self._unsettled[request.node] = self._clock.now + self._slack - request.slack
-        if request.may_repeat and request.attempts < request.tries and not request.withdrawn:
+        if request.may_repeat and request.again:
             self._waiting.appendleft(request)
         else:
-            request.done(self._failure(request))
+            request.done(request.failure())
         self._next()
 
     def _pause(self) -> None:
@@ -449,17 +403,3 @@ class Caller:
         waiting, self._stopping = self._stopping, []
         for done in waiting:
             done(outcome)
-
-    def _failure(self, request: _Request) -> MotherError:
-        """What is known in the end: NAK says that it was not executed, silence says nothing."""
-        kind: type[Refused | NoAnswer | UnknownOutcome] = UnknownOutcome
-        if request.refusals == request.attempts:
-            kind = Refused
-        elif request.may_repeat and not request.refusals:
-            kind = NoAnswer
-        return kind(request.node, _shown(request.body), request.attempts, request.last)
-
-
-def _shown(body: bytes) -> str:
-    """A line as it was asked for, without the space that its CRC may have needed."""
-    return body.decode("latin-1").rstrip(" ")

@@ -21,7 +21,7 @@ from sacbus.mother import (
     Sent,
     UnknownOutcome,
 )
-from sacbus.mother.caller import SoftOpHeard
+from sacbus.mother.soft_ops import SoftOpHeard
 from sacbus.wire import encode
 from tests.mother.rig import Outcome, Rig, Weather, answer_lost, body_spoilt, packet_lost
 
@@ -489,3 +489,32 @@ def test_the_longest_call_is_one_that_fails_to_its_end(body: bytes) -> None:
     assert isinstance(outcomes[0], NoAnswer)
     # It has a pause before it, one after each answer, and a space for its CRC to spare.
     assert took < rig.caller.longest_call(len(body)) < took + 8 * MS
+
+
+def test_without_a_gap_the_next_request_follows_the_answer_at_once() -> None:
+    kernel = Kernel()
+    bus = Bus(kernel, KIND.protocol)
+    bus.add(KIND.create(10, SacSettings(deaf_time=False), bus.rate, bus.tell))
+    outcomes: list[Outcome] = []
+    starts: list[int] = []
+    port = Port(bus.medium, lambda heard, _now: caller.hear(heard.data), latency=0)
+    caller = Caller(kernel, port.talk, gap=0)
+    bus.medium.watchers.append(lambda sent: starts.append(sent.start))
+    for _ in range(3):
+        caller.call(10, b"m400", outcomes.append)
+    kernel.run()
+    exchange = TEN_BYTES + TURNAROUND + FOUR_BYTES
+    assert starts[::2] == [0, exchange, 2 * exchange]
+    assert outcomes == [Acknowledged(10, 1, exchange)] * 3
+
+
+def test_without_a_gap_what_was_refused_is_asked_again_before_the_next() -> None:
+    rig = Rig(10)
+    rig.caller = Caller(rig.kernel, rig._send, gap=0)
+    rig.expect([body_spoilt, packet_lost])
+    first, second = rig.call(10, b"V100"), rig.call(10, b"V200")
+    rig.kernel.run()
+    assert isinstance(first[0], Acknowledged)
+    assert isinstance(second[0], Acknowledged)
+    # Spoilt and refused; sent into the time in which the node is deaf; heard; and the next one.
+    assert [packet[3:7] for packet in rig.sent[:3]] == [b"V100"] * 3
