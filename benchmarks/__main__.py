@@ -8,7 +8,20 @@ import platform
 from collections.abc import Callable
 from dataclasses import asdict
 
-from benchmarks import bus, kernel, lateness, line, motion, pty, recording, simad, tcp, wire
+from benchmarks import (
+    bus,
+    gcode,
+    kernel,
+    lateness,
+    line,
+    motion,
+    pty,
+    recording,
+    simad,
+    tcp,
+    transactions,
+    wire,
+)
 from benchmarks.figure import Figure
 from sacbus.wire import CRC_IS_FAST
 
@@ -16,12 +29,14 @@ BENCHMARKS: dict[str, Callable[[int], list[Figure]]] = {
     "wire": wire.figures,
     "kernel": kernel.figures,
     "motion": motion.figures,
+    "gcode": gcode.figures,
     "bus": bus.figures,
     "recording": recording.figures,
     "simad": simad.figures,
     "line": line.figures,
     "pty": pty.figures,
     "tcp": tcp.figures,
+    "transactions": transactions.figures,
     "lateness": lateness.figures,
 }
 

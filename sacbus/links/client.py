@@ -39,6 +39,9 @@ class Wire(Protocol):
     def send(self, data: bytes) -> object:
         """Write without waiting."""
 
+    def set_dtr(self, *, asserted: bool) -> bool:
+        """Set a spare output; False where there is none."""
+
     def close(self) -> object:
         """Close without waiting for anything. Idempotent."""
 
@@ -68,6 +71,10 @@ class Line:
         """Write without waiting; what is written to a line that is gone is lost with it."""
         if self._wire is not None:
             self._wire.send(data)
+
+    def set_dtr(self, *, asserted: bool) -> bool:
+        """Set the DTR output of a serial port, now; False where there is none, or it is gone."""
+        return self._wire is not None and self._wire.set_dtr(asserted=asserted)
 
     def close(self) -> None:
         """Close the line at once. Idempotent."""
@@ -225,6 +232,9 @@ class _Socket(asyncio.Protocol):
             return
         if transport.get_write_buffer_size() + len(data) <= BOUND:
             transport.write(data)
+
+    def set_dtr(self, *, asserted: bool) -> bool:  # noqa: ARG002 (as other wires)
+        return False
 
     def close(self) -> None:
         if self._transport is not None:

@@ -34,6 +34,7 @@ import serial
 import serial_asyncio
 
 from .errors import LinkError
+from .hardware import set_dtr
 
 if sys.platform != "win32":
     import termios
@@ -165,6 +166,10 @@ class SerialConnection(asyncio.Protocol):
         if rest:
             self._transport.write(rest)
         return taken + len(rest)
+
+    def set_dtr(self, *, asserted: bool) -> bool:
+        """Set the DTR output now; False where there is none, or the port is gone."""
+        return not self._ended and set_dtr(self.port, asserted=asserted)
 
     def hold(self, *, held: bool) -> None:
         """Read no more, or go on. A port that is unplugged meanwhile is noticed afterwards."""

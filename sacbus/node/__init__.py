@@ -9,6 +9,7 @@ time. Nothing here knows a particular protocol or kind.
 from .contract import (
     BOOT,
     OFF,
+    STANDBY,
     Heard,
     Node,
     PinError,
@@ -44,6 +45,7 @@ __all__ = [
     "EVERYONE",
     "GROUP",
     "OFF",
+    "STANDBY",
     "Decoder",
     "Heard",
     "KindError",
