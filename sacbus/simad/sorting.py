@@ -57,8 +57,9 @@ class EdgeSorter:
             keys = keys[:end]
         else:
             self._keys = []
-        lines = ((keys >> LEVEL_BITS) + 1).astype(np.uint8)  # DIR_KEY + 1 is 0 in a byte
-        edges = Edges(keys >> SHIFT, lines, (keys & 1).astype(np.uint8), self.direction)
+        which = keys.astype(np.uint16)  # what of a key is no instant, and some of that
+        lines = ((which >> LEVEL_BITS) + 1).astype(np.uint8)  # DIR_KEY + 1 is 0 in a byte
+        edges = Edges(keys >> SHIFT, lines, (which & 1).astype(np.uint8), self.direction)
         turns = np.flatnonzero(lines == DIR)
         if turns.size:
             self.direction = int(edges.levels[turns[-1]])
