@@ -140,6 +140,18 @@ class Transmission:
             bits[index - first] ^= crc32(b"%d %d %d" % (seed, self.number, index)) >> 16 & 1
         return bytes(bits)
 
+    def framing_errors(self, first: int, last: int, seed: int) -> bytes | None:
+        """A 1 for each of bytes ``first`` to ``last`` (exclusive) that has no stop bit.
+
+        None where all have theirs. Of overlapped bytes half have none.
+        """
+        if self.hits is None:
+            return None
+        found = bytearray(last - first)
+        for index in self._struck(self.hits, first, last):
+            found[index - first] = crc32(b"%d %d %d" % (seed, self.number, index)) >> 17 & 1
+        return bytes(found)
+
     def _struck(self, hits: list[tuple[Ns, Ns]], first: int, last: int) -> set[int]:
         """Indices in ``first``..``last`` of the bytes that a hit touches, however briefly."""
         struck: set[int] = set()

@@ -25,11 +25,15 @@ from .kind import (
     MemoryValue,
     MemoryWords,
     NodeKind,
+    PolyglotKind,
     find_kind,
+    find_protocol,
     kind_names,
     kinds,
+    protocols_of,
+    spoken_by,
 )
-from .protocol import EVERYONE, Decoder, Protocol, Said
+from .protocol import EVERYONE, MASTER, Decoder, Protocol, Said
 from .settings import (
     NodeSettings,
     Setting,
@@ -43,6 +47,7 @@ __all__ = [
     "BOOT",
     "EVERYONE",
     "GROUP",
+    "MASTER",
     "OFF",
     "Decoder",
     "Heard",
@@ -55,6 +60,7 @@ __all__ = [
     "NodeSettings",
     "PinError",
     "Pins",
+    "PolyglotKind",
     "Protocol",
     "Report",
     "ReportKind",
@@ -64,9 +70,12 @@ __all__ = [
     "Snapshot",
     "Terminal",
     "find_kind",
+    "find_protocol",
     "kind_names",
     "kinds",
     "misfits",
+    "protocols_of",
     "setting_list",
     "settings_from",
+    "spoken_by",
 ]

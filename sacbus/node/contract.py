@@ -41,7 +41,8 @@ class Heard:
     without a pause. ``ninth`` holds a 0 or 1 for each of them where the line has ninth bits and the
     sender sent some. ``following`` is what its sender goes on with behind ``data``: a device sees
     each of these bytes begin in time, so it may take into account that they come, and when. What
-    they turn out to be is heard later, if at all.
+    they turn out to be is heard later, if at all. ``framing`` holds a 1 for each byte whose stop
+    bit did not come; None where all did.
     """
 
     data: bytes
@@ -50,6 +51,7 @@ class Heard:
     rate: LineRate
     following: bytes
     ninth: bytes | None = None
+    framing: bytes | None = None
 
     def begins(self, index: int) -> Ns:
         """When byte ``index`` of ``data`` began (its start bit)."""

@@ -162,7 +162,8 @@ def far_bench(
 
     def hear(data: bytes) -> None:
         now = clock.now
-        bench.line.note(Passed(max(now - rate.span(len(data)), 0), now, 0, "line", data))
+        begun = max(now - rate.span(len(data)), 0)
+        bench.line.note(Passed(begun, now, protocol.lanes - 1, "line", data))
         bench.caller.hear(data)
 
     bench = Bench(name, clock, protocol, send, lambda: 0, rate.span)
@@ -186,7 +187,9 @@ def _watch(bench: Bench, hosted: HostedBus) -> None:
         data = sent.data
         if sent.hits is not None or sent.passage is not None:
             data = sent.outcome(seed)
-        line.note(Passed(sent.start, sent.end, sent.lane, who, data, sent.collided, sent.faults))
+        ninth = sent.outcome_ninth(seed)
+        collided, faults = sent.collided, sent.faults
+        line.note(Passed(sent.start, sent.end, sent.lane, who, data, collided, faults, ninth))
         bench.stir()
 
     def report(told: Report) -> None:

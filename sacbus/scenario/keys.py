@@ -84,7 +84,7 @@ def _is_nodes(value: object) -> bool:
         except NotationError:
             return False
         return True
-    return value == "all" or _whole(4, 255)(value)
+    return value == "all" or _whole(0, 255)(value)
 
 
 def _is_hex(value: object) -> bool:
