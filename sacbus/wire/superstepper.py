@@ -1,9 +1,9 @@
 """The Super Stepper Bus: the master's messages and the modules' answers, as bytes and as values.
 
 Owns the header, the operands of the eight opcodes, the acknowledge and its checksum, and every
-place of a bit, in one table. Figures are missing from the manual's text, so the places marked [D] there
-are decisions. Both directions of the bus have wires of their own, so messages and answers are never
-mixed up, though nothing in the bytes tells them apart.
+place of a bit, in one table. Figures are missing from the manual's text, so the places marked [D]
+there are decisions. Both directions of the bus have wires of their own, so messages and answers are
+never mixed up, though nothing in the bytes tells them apart.
 
 Source: SS-MST67 manual, Tables 1 to 5; spec, superstepper.
 """
