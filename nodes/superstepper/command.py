@@ -265,7 +265,10 @@ class CommandProcessor:
 
     def _set_microsteps(self, wanted: Microsteps, now: Ns) -> None:
         self._ram.set_microsteps(wanted)
-        self.engine.set_unit(EIGHTHS >> wanted.exponent, now)
+        self._use_microsteps(now)
+
+    def _use_microsteps(self, now: Ns) -> None:
+        self.engine.set_unit(EIGHTHS >> self._ram.microsteps.exponent, now)
 
     def _read(self, message: Read, now: Ns) -> int:
         if message.eeprom:
@@ -285,4 +288,4 @@ class CommandProcessor:
                 ReportKind.IGNORED, f"a write to RAM 0x{message.address:02x}, which takes none"
             )
         elif message.address % RAM_SIZE == MS_DECAY:
-            self._set_microsteps(self._ram.microsteps, now)
+            self._use_microsteps(now)
