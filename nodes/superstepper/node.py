@@ -118,6 +118,13 @@ class SuperStepperNode:
             )
 
     @property
+    def uart_baud(self) -> int | None:
+        """What its crystal makes of the line's rate, where that is to be so; None: the line's."""
+        if not self._settings.own_baud or self._network.deaf:
+            return None
+        return round(own_baud(self.uart_code))
+
+    @property
     def uart_code(self) -> int:
         """The baud code that it runs by."""
         return 103 if self._settings.jmp1 == "open" else self.eeprom.baud_code

@@ -33,6 +33,7 @@ class Transmission:
         "cuts",
         "data",
         "end",
+        "framing",
         "hits",
         "lane",
         "ninth",
@@ -67,6 +68,8 @@ class Transmission:
         self.end = end
         self.cuts = cuts
         self.ninth = ninth
+        #: A 1 for each byte that was sent without a stop bit; None where none was.
+        self.framing: bytes | None = None
         self.step = 0
         self.to_nodes = 0
         self.to_listeners = 0
@@ -146,10 +149,10 @@ class Transmission:
         None where all have theirs. Of overlapped bytes half have none.
         """
         if self.hits is None:
-            return None
-        found = bytearray(last - first)
+            return self.framing and self.framing[first:last]
+        found = bytearray(last - first if self.framing is None else self.framing[first:last])
         for index in self._struck(self.hits, first, last):
-            found[index - first] = crc32(b"%d %d %d" % (seed, self.number, index)) >> 17 & 1
+            found[index - first] |= crc32(b"%d %d %d" % (seed, self.number, index)) >> 17 & 1
         return bytes(found)
 
     def _struck(self, hits: list[tuple[Ns, Ns]], first: int, last: int) -> set[int]:

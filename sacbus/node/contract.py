@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, runtime_checkable
 from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
@@ -18,6 +18,7 @@ __all__ = [
     "BOOT",
     "OFF",
     "Heard",
+    "MistunedNode",
     "Node",
     "PinError",
     "Pins",
@@ -255,4 +256,14 @@ class Node(Contract):
 
     def persist(self) -> Mapping[str, object]:
         """The contents of its EEPROM, as JSON has them. Cheap: it is asked at each change."""
+        ...
+
+
+@runtime_checkable
+class MistunedNode(Contract):
+    """What a node has besides whose UART may run at a rate of its own."""
+
+    @property
+    def uart_baud(self) -> int | None:
+        """That rate, as it is put on its line; None: the line's."""
         ...

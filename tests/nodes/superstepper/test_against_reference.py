@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -106,5 +108,5 @@ def test_steps_end_on_the_last_one_and_mirror_the_way_up(steps: int) -> None:
     assert course is not None
     assert course.steps == steps
     ticks = course.step_times(0, 1 << 40).tolist()
-    gaps = [late - early for early, late in zip(ticks, ticks[1:], strict=False)]
+    gaps = [late - early for early, late in pairwise(ticks)]
     assert gaps == gaps[::-1]
