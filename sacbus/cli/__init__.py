@@ -27,6 +27,7 @@ from sacbus.cli.queue import queue_group
 from sacbus.cli.run import run_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
+from sacbus.cli.ss import ss_group
 from sacbus.cli.terminal import terminal_command
 
 __all__ = ["root", "run"]
@@ -52,6 +53,7 @@ def root(context: click.Context) -> int | None:
 for command in (
     serve_command,
     send_command,
+    ss_group,
     terminal_command,
     monitor_command,
     run_command,

@@ -19,7 +19,9 @@ import asyncio
 import contextlib
 import socket
 import threading
+import time
 import warnings
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -28,6 +30,7 @@ from serial import rfc2217
 
 from .client import BOUND, unreachable
 from .errors import LinkError
+from .marking import NINE_BITS, runs
 
 __all__ = ["RemotePort"]
 
@@ -152,6 +155,7 @@ class RemotePort:
         #: What is to be written, and whether anything more will be; both under the condition.
         self._work = threading.Condition()
         self._waiting = bytearray()
+        self._marked: deque[tuple[str, bytes]] = deque()
         self._closing = False
 
     async def open(self) -> None:
@@ -175,6 +179,15 @@ class RemotePort:
                 self._waiting += data
                 self._work.notify()
 
+    def check_marking(self) -> None:
+        """Its server is asked for the parity when there is something to send."""
+
+    def send_marked(self, data: bytes, ninth: bytes) -> None:
+        """Have it written, each run of bytes with the parity that makes their ninth bits."""
+        with self._work:
+            self._marked += runs(data, ninth)
+            self._work.notify()
+
     def close(self) -> None:
         """Have it closed, behind what waits to be written. Idempotent."""
         with self._work:
@@ -197,6 +210,10 @@ class RemotePort:
             with contextlib.suppress(OSError):  # the reader tells of it
                 while data := self._next():
                     self._port.write(data)
+                    if self._marked:
+                        # RFC 2217 has no word for "when these are out": wait for as long as the
+                        # line takes, or the parity changes under them.
+                        time.sleep(len(data) * NINE_BITS / self._port.baudrate)
         finally:
             self._port.close()
             self._on_loop(self._ended.set)
@@ -204,7 +221,12 @@ class RemotePort:
     def _next(self) -> bytes:
         """What is to be written next; b"" when that was all."""
         with self._work:
-            self._work.wait_for(lambda: self._waiting or self._closing)
+            self._work.wait_for(lambda: self._waiting or self._marked or self._closing)
+            if self._marked:
+                parity, data = self._marked.popleft()
+                if parity != self._port.parity:
+                    self._port.parity = parity
+                return data
             data = bytes(self._waiting)
             self._waiting.clear()
             return data
