@@ -67,7 +67,9 @@ class SuperStepperProtocol:
             case Told(address, message, data):
                 words = describe(message)
                 reply = TURNAROUND
-                return Said("packet", MASTER, address, data[1:], words, "", len(data), reply)
+                return Said(
+                    "packet", MASTER, address, data[1:], words, "", len(data), reply, binary=True
+                )
             case Acknowledged(answer):
                 kind = "ack" if answer.positive else "nak"
                 return Said(kind, answer.address, MASTER, b"", _words(answer), "right", ANSWER_SIZE)

@@ -148,7 +148,7 @@ class JsonPage:
                 }
                 if said.kind == "packet":
                     fields |= {
-                        "body": said.data.decode("latin-1"),
+                        "body": said.body,
                         "words": said.words,
                         "verdict": said.verdict,
                     }
@@ -164,7 +164,7 @@ class JsonPage:
                 return self._begin("no answer", time) | {
                     "source": _address(request.said.source),
                     "destination": _address(request.said.destination),
-                    "body": request.said.data.decode("latin-1"),
+                    "body": request.said.body,
                     "request_ns": request.start,
                 }
             case Collision():
@@ -236,7 +236,7 @@ def _address(address: int | None) -> int | None:
 
 
 def _body(entry: Spoken) -> str:
-    return entry.said.data.decode("latin-1")
+    return entry.said.body
 
 
 def _to(request: Spoken) -> str:

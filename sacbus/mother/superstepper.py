@@ -48,7 +48,15 @@ from sacbus.wire.superstepper import (
     encode,
 )
 
-__all__ = ["BadChecksum", "Exchanges", "Nak", "NoReply", "SuperStepper", "SuperStepperError"]
+__all__ = [
+    "BadChecksum",
+    "Exchanges",
+    "Hosted",
+    "Nak",
+    "NoReply",
+    "SuperStepper",
+    "SuperStepperError",
+]
 
 #: How late an answer may be beyond the line's own figures, on a line in this process; it covers the
 #: turnaround, of which nothing is published.
@@ -102,6 +110,44 @@ class _Talk(Contract):
     """Bytes to the line; ``ninth``: a 0 or 1 for each, which a line without ninth bits ignores."""
 
     def __call__(self, data: bytes, ninth: bytes) -> object: ...
+
+
+class _Port(Contract):
+    """A place on a line."""
+
+    @property
+    def talk(self) -> _Talk: ...
+
+    @property
+    def unsent(self) -> int: ...
+
+
+class _Host(Contract):
+    """Who runs a bus in this process."""
+
+    @property
+    def kernel(self) -> Clock: ...
+
+    def arrive(self, callback: Callable[..., object], *arguments: object) -> None: ...
+
+
+class _Line(Contract):
+    """What a bus has of a line."""
+
+    @property
+    def rate(self) -> LineRate: ...
+
+
+class Hosted(Contract):
+    """What a master asks of a bus in this process: what :func:`sacbus.open_bus` gives has it."""
+
+    @property
+    def host(self) -> _Host: ...
+
+    @property
+    def bus(self) -> _Line: ...
+
+    def port(self, hear: Callable[[bytes], None]) -> _Port: ...
 
 
 _Done = Callable[[Answer | MotherError], None]
@@ -312,6 +358,26 @@ class SuperStepper:
                 yield master
             finally:
                 master.lose(f"the line was closed, {link}, connect again")
+
+    @classmethod
+    def on(cls, bus: Hosted) -> SuperStepper:
+        """The master on a bus in this process, at no distance from its line; closed with it."""
+        masters: list[SuperStepper] = []
+
+        def hear(data: bytes) -> None:
+            masters[0].hear(data)
+
+        port = bus.port(hear)
+        masters.append(
+            cls(
+                bus.host.kernel,
+                port.talk,
+                bus.bus.rate,
+                unsent=lambda: port.unsent,
+                arrive=bus.host.arrive,
+            )
+        )
+        return masters[0]
 
     def hear(self, data: bytes) -> None:
         """The link's side: bytes from the line."""

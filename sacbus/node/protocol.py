@@ -37,7 +37,7 @@ class Said:
     body, or the garbage as it came. ``words`` say what it means, without addresses. ``verdict`` is
     what the check says: ``right``, ``unchecked`` (none was sent), ``wrong``, or a word of the
     protocol's own for what else is wrong; empty where nothing is to be checked. ``size``: bytes on
-    the wire.
+    the wire. ``binary``: the body is no text.
     ``reply_after``: how long after the end of a packet its answer begins, by the protocol's
     figures, in ns; None when nobody answers it.
     """
@@ -51,6 +51,12 @@ class Said:
     size: int
     reply_after: Ns | None = None
     general: bool = False
+    binary: bool = False
+
+    @property
+    def body(self) -> str:
+        """``data`` as people are shown it: as text, or in hexadecimal where it is ``binary``."""
+        return self.data.hex(" ") if self.binary else self.data.decode("latin-1")
 
 
 class Decoder(Contract):

@@ -182,7 +182,6 @@ def far_bench(
         bench.line.note(Passed(begun, now, protocol.lanes - 1, "line", data))
         bench.caller.hear(data)
 
-
     def say(data: bytes, _ninth: bytes | None) -> None:
         send(data)
 

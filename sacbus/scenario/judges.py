@@ -336,10 +336,7 @@ class _PacketJudge:
             and wanted.source in (None, said.source)
             and wanted.destination in (None, said.destination)
             and wanted.body in (None, said.data)
-            and (
-                self._pattern is None
-                or self._pattern.fullmatch(said.data.decode("latin-1")) is not None
-            )
+            and (self._pattern is None or self._pattern.fullmatch(said.body) is not None)
         )
 
     def _late(self) -> None:

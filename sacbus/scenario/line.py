@@ -74,5 +74,5 @@ def _said(said: Said) -> str:
     verdict = "" if said.verdict in ("right", "") else f", CRC {said.verdict}"
     where = "all" if said.general else "master" if said.destination == MASTER else said.destination
     if said.kind == "packet":
-        return f"to {where} {said.data.decode('latin-1')!r}, {said.words}{verdict}"
+        return f"to {where} {said.body!r}, {said.words}{verdict}"
     return f"{said.kind.upper()} to {where}{verdict}"
