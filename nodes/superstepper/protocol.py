@@ -45,7 +45,7 @@ class SuperStepperProtocol:
         self.rate = LineRate(9_600, _BITS[mode])
         self._nine = mode == 9
 
-    def patience(self, byte: Ns) -> Ns | None:
+    def patience(self, byte: Ns) -> Ns:
         """The time-out of the modules."""
         return patience(byte)
 

@@ -64,11 +64,11 @@ class Bench:
         self.kernel.run_until(self.now + time)
 
     def exchange(self, data: str) -> str:
-        """Bytes in hexadecimal, and what is answered within 20 ms after them."""
+        """Bytes in hexadecimal, and what is answered in the time of 20 bytes and 10 ms."""
         self.heard.clear()
         sent = bytes.fromhex(data)
         self.talk(sent)
-        self.run(self.span(len(sent)) + 20_000_000)
+        self.run(self.span(len(sent) + 20) + 10_000_000)
         return b"".join(one.data for one in self.heard).hex(" ")
 
     def ask(self, address: int, message: Message) -> Answer:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from nodes.superstepper import KIND
+from nodes.superstepper import KIND, SuperStepperSettings
 from sacbus.kernel import MS, SECOND, LineRate
-from sacbus.node import ReportKind, settings_from
+from sacbus.node import ReportKind
 from sacbus.wire.superstepper import (
     Answer,
     ChangeSpeed,
@@ -403,9 +403,7 @@ def test_the_eeprom_is_used_after_the_next_power_on() -> None:
     assert bench.ask(9, Read(3, word=True)).value == 0x3039
     assert bench.ask(9, Read(0x80, eeprom=True)).value == 0x42
     # And so it is in another life.
-    again = KIND.create(
-        3, settings_from(KIND.settings, {}), LineRate(9_600), lambda _: None, node.persist()
-    )
+    again = KIND.create(3, SuperStepperSettings(), LineRate(9_600), lambda _: None, node.persist())
     assert again.address == 9
     assert again.eeprom.bytes == node.eeprom.bytes
 
