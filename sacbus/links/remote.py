@@ -81,6 +81,8 @@ class _Port(rfc2217.Serial):
 
     def __init__(self, heard: _Heard) -> None:
         self._heard = heard
+        #: The parity that was asked for last.
+        self._asked = ""
         super().__init__()
 
     @property
@@ -109,6 +111,12 @@ class _Port(rfc2217.Serial):
     def rfc2217_set_control(self, value: bytes) -> None:
         """RTS, DTR and the like: asked for, and not insisted upon."""
         self._rfc2217_options["control"].set(value)
+
+    def ask_parity(self, parity: str) -> None:
+        """Have the server set it before what is written next; pyserial's own setting waits."""
+        if parity != self._asked:
+            self._asked = parity
+            self._rfc2217_options["parity"].set(bytes((rfc2217.RFC2217_PARITY_MAP[parity],)))
 
     def close(self) -> None:
         """Close the socket whatever state it is in, and see its reader's thread end."""
@@ -224,8 +232,7 @@ class RemotePort:
             self._work.wait_for(lambda: self._waiting or self._marked or self._closing)
             if self._marked:
                 parity, data = self._marked.popleft()
-                if parity != self._port.parity:
-                    self._port.parity = parity
+                self._port.ask_parity(parity)
                 return data
             data = bytes(self._waiting)
             self._waiting.clear()
