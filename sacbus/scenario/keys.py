@@ -90,7 +90,7 @@ def _is_nodes(value: object) -> bool:
 def _is_hex(value: object) -> bool:
     try:
         return isinstance(value, str) and bool(marked_bytes(value)[0])
-    except ValueError:
+    except QuantityError:
         return False
 
 

@@ -116,13 +116,16 @@ def bounds(value: object) -> Bounds:
 def marked_bytes(text: str) -> tuple[bytes, bytes | None]:
     """``^18 04 0f``: bytes, and the ninth bit of each, which is 1 behind a ``^``; None: no such.
 
-    ValueError for what is no bytes in hexadecimal.
+    QuantityError for what is no bytes in hexadecimal, and for a ``^`` without a byte behind it.
     """
     marked, data = bytearray(), bytearray()
     for place, part in enumerate(text.split("^")):
-        run = bytes.fromhex(part)
-        if place and not run:
-            raise ValueError("a ^ without a byte")
+        try:
+            run = bytes.fromhex(part)
+        except ValueError:
+            run = b""
+        if not run and (place or part.strip()):
+            raise QuantityError(f"expected bytes in hexadecimal, got {shown(text)}")
         marked += bytes((1, *bytes(len(run) - 1))) if place else bytes(len(run))
         data += run
     return bytes(data), bytes(marked) if "^" in text else None
