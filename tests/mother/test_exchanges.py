@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
-
 import pytest
 
 from sacbus.kernel import MS
@@ -21,7 +19,6 @@ from sacbus.wire.superstepper import (
 )
 from tests.nodes.superstepper.bench import Bench
 
-_T = TypeVar("_T")
 Outcome = Answer | MotherError
 
 MOVE = MoveSteps(True, 10_000, 10)

@@ -15,20 +15,15 @@ from sacbus.hosted import HostedBus
 from sacbus.kernel import Kernel
 from sacbus.links import LinkError
 from sacbus.links.places import PtyAt, Rfc2217At, TcpAt
-from sacbus.mother import BadRequest, LineLost, MotherError
+from sacbus.mother import BadRequest, LineLost
 from sacbus.mother.superstepper import NoReply, SuperStepper
 from sacbus.wire.superstepper import (
-    Answer,
     Decay,
-    MoveSteps,
     Rate,
     Status,
 )
 
 _T = TypeVar("_T")
-Outcome = Answer | MotherError
-
-MOVE = MoveSteps(True, 10_000, 10)
 
 
 def virtually(main: Coroutine[Any, Any, _T]) -> _T:
