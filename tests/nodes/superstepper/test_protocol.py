@@ -95,6 +95,8 @@ def test_a_message_without_an_answer_is_noticed_and_a_cut_one_given_up() -> None
     assert isinstance(answered, Spoken)
     assert answered.request is whole
     assert answered.delay == MS
+    # There is no check in a message, so none is wrong.
+    assert (watch.summary.packets, watch.summary.wrong) == (2, 0)
 
 
 def test_a_link_hears_the_modules_alone() -> None:
