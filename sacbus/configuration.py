@@ -83,7 +83,8 @@ def check(configuration: Configuration) -> Protocol:
         raise SettingError(f"baud: expected 300 to 4000000, got {configuration.baud}")
     if configuration.lanes not in (None, 1, 2):
         raise SettingError(f"lanes: expected 1 or 2, got {configuration.lanes}")
-    protocol = find_kind(configuration.kind).protocol
+    default = find_kind(configuration.kind)
+    protocol = spoken_by(default, settings_from(default.settings, configuration.settings))
     seen: set[int] = set()
     nodes = configuration.every_node
     # Found once each: all that is installed is looked through for one.

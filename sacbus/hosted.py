@@ -225,7 +225,7 @@ class HostedBus:
         self._ports.append(port)
         return port
 
-    def port(self, hear: Callable[[bytes], None], *, name: str = "master") -> Port:
+    def port(self, hear: Callable[[bytes], None]) -> Port:
         """A place on this very line for a master of one's own, at no distance from it.
 
         ``hear`` is given what the nodes say; ``Port.talk`` and ``Port.unsent`` are what a master
@@ -235,7 +235,7 @@ class HostedBus:
         def heard(one: Heard, _now: Ns) -> None:
             hear(one.data)
 
-        port = Port(self.bus.medium, heard, latency=0, name=name)
+        port = Port(self.bus.medium, heard, latency=0, name="mother")
         self._ports.append(port)
         return port
 
@@ -245,7 +245,7 @@ class HostedBus:
         def hear(data: bytes) -> None:
             mother.hear(data)
 
-        port = self.port(hear, name="mother")
+        port = self.port(hear)
         mother = Mother(
             self.host.kernel,
             port.talk,

@@ -9,7 +9,7 @@ Source: manual, "Commands"; spec, superstepper ("Motion").
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, assert_never
 
 from nodes.superstepper.course import ACCEL, DECEL, Stretch
 from nodes.superstepper.engine import EIGHTHS, Engine
@@ -144,6 +144,8 @@ class CommandProcessor:
                 return self._read(message, now)
             case Expanded():
                 pass
+            case _:
+                assert_never(message)
         return 0
 
     def wake(self, now: Ns) -> None:

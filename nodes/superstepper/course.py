@@ -93,11 +93,6 @@ class Running(NamedTuple):
         """Half of it, in ticks."""
         return self.stretch.divider * self.stretch.value_of(self.number)
 
-    @property
-    def end(self) -> int:
-        """When it is over."""
-        return self.begin + 2 * self.half
-
 
 class Course:
     """Stretches one after the other; those that hold nothing are left out."""

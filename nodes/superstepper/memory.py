@@ -16,7 +16,7 @@ __all__ = [
     "BAUDS",
     "CRYSTAL",
     "FACTORY_BAUD",
-    "FALLBACK_BAUD",
+    "FALLBACK_CODE",
     "MS_DECAY",
     "STATUS",
     "STEPS_RUN",
@@ -45,8 +45,8 @@ BAUDS: Final[Mapping[int, int]] = {
 #: Hz of the crystal that the UART divides by 16 and by the code plus 1.
 CRYSTAL: Final = 4_000_000
 
-#: What JMP1 open selects, and what a code that Table 6 lacks falls back to (spec, [D]).
-FALLBACK_BAUD: Final = 2_400
+#: The rate that JMP1 open selects, 2400 baud, and that of a code that Table 6 lacks (spec, [D]).
+FALLBACK_CODE: Final = 103
 
 #: The code that the EEPROM leaves the factory with: 9600 baud (spec, [D]).
 FACTORY_BAUD: Final = 25
@@ -54,7 +54,7 @@ FACTORY_BAUD: Final = 25
 
 def nominal_baud(code: int) -> int:
     """The rate that a code stands for."""
-    return BAUDS.get(code, FALLBACK_BAUD)
+    return BAUDS.get(code, BAUDS[FALLBACK_CODE])
 
 
 def code_of(baud: int) -> int | None:
@@ -64,9 +64,7 @@ def code_of(baud: int) -> int | None:
 
 def own_baud(code: int) -> float:
     """The rate that the UART really has by that code, bit/s."""
-    if code not in BAUDS:
-        code = next(one for one, rate in BAUDS.items() if rate == FALLBACK_BAUD)
-    return CRYSTAL / 16 / (code + 1)
+    return CRYSTAL / 16 / ((code if code in BAUDS else FALLBACK_CODE) + 1)
 
 
 def baud_error(code: int) -> float:

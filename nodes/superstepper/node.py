@@ -11,7 +11,7 @@ from typing import Final
 
 from nodes.superstepper.command import CommandProcessor
 from nodes.superstepper.engine import EIGHTHS, Engine, timer
-from nodes.superstepper.memory import FALLBACK_BAUD, baud_error, nominal_baud, own_baud
+from nodes.superstepper.memory import FALLBACK_CODE, baud_error, nominal_baud, own_baud
 from nodes.superstepper.movement import SuperStepperMovement
 from nodes.superstepper.network import NetworkPort
 from nodes.superstepper.pins import SuperStepperPins
@@ -74,35 +74,39 @@ class SuperStepperNode:
             kept = {name: value for name, value in memory.items() if name not in settings.stored}
             remarks = self.eeprom.restore(kept)
         self._power_on()
+        self._tell_how_it_is_set()
         for remark in remarks:
             self.tell(ReportKind.WARNING, remark)
 
     def _power_on(self) -> None:
         """Take over what the jumpers select, and load the RAM."""
         settings, eeprom = self._settings, self.eeprom
-        if settings.jmp1 == "open":
-            address, baud = 0, FALLBACK_BAUD
-        else:
-            address, baud = eeprom.address, nominal_baud(eeprom.baud_code)
         self._network = NetworkPort(
-            address,
+            0 if self._hardwired else eeprom.address,
             self,
             self._rate,
             nine=settings.nine,
             turnaround=settings.turnaround_us * US,
         )
+        self._network.deaf = nominal_baud(self.uart_code) != self._rate.baud
         self._commands = CommandProcessor(Engine(timer(settings.ppm)), eeprom, self)
-        self._check_rate(baud)
-        if address != self._configured:
-            why = "JMP1 is open" if settings.jmp1 == "open" else "its EEPROM says so"
+
+    @property
+    def _hardwired(self) -> bool:
+        """Whether rate and address are those of JMP1."""
+        return self._settings.jmp1 == "open"
+
+    def _tell_how_it_is_set(self) -> None:
+        """What may not be as it was meant."""
+        if self.address != self._configured:
+            why = "JMP1 is open" if self._hardwired else "its EEPROM says so"
             self.tell(
                 ReportKind.WARNING,
-                f"it answers at address {address}, not at the configured {self._configured}: {why}",
+                f"it answers at address {self.address}, not at the configured "
+                f"{self._configured}: {why}",
             )
-
-    def _check_rate(self, baud: int) -> None:
-        if baud != self._rate.baud:
-            self._network.deaf = True
+        baud = nominal_baud(self.uart_code)
+        if self._network.deaf:
             self.tell(
                 ReportKind.WARNING,
                 f"it is set to {baud} baud, the line runs at {self._rate.baud}: it hears nothing",
@@ -127,7 +131,7 @@ class SuperStepperNode:
     @property
     def uart_code(self) -> int:
         """The baud code that it runs by."""
-        return 103 if self._settings.jmp1 == "open" else self.eeprom.baud_code
+        return FALLBACK_CODE if self._hardwired else self.eeprom.baud_code
 
     # ---- the bus's side ----
 
@@ -207,7 +211,9 @@ class SuperStepperNode:
         self.powered = on
         self._power_on()
         self._commands.home = home
-        if not on:
+        if on:
+            self._tell_how_it_is_set()
+        else:
             self._network.switch_off()
         self.look(now)
 

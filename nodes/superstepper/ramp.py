@@ -97,9 +97,7 @@ class Ramp:
         return self._begins[run] + (number - self._firsts[run]) * period
 
     def begins(self, numbers: Ticks) -> Ticks:
-        """:meth:`begin` of many."""
-        if not self.periods:
-            return np.zeros_like(numbers)
+        """:meth:`begin` of many; of a ramp that has any."""
         firsts, begins, values = (
             np.frombuffer(one, dtype=np.int64) for one in (self._firsts, self._begins, self._values)
         )

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, assert_never
 
 __all__ = [
     "ADDRESSES",
@@ -304,6 +304,8 @@ def _operands(message: Message) -> tuple[Opcode, tuple[int, ...]]:
             return Opcode.READ, (_MEM_EEPROM.put(eeprom) | _MEM_WORD.put(word), address)
         case Expanded():
             return Opcode.EXPANDED, ()
+        case _:
+            assert_never(message)
 
 
 def _direction(clockwise: bool, rate: Rate) -> int:
@@ -348,6 +350,8 @@ def _meaning(opcode: Opcode, data: bytes) -> Message:
             return Read(data[2], eeprom, word)
         case Opcode.EXPANDED:
             return Expanded()
+        case _:
+            assert_never(opcode)
 
 
 def encode_answer(answer: Answer) -> bytes:
@@ -404,6 +408,8 @@ def describe(message: Message) -> str:
         case Read(address, eeprom, word):
             size = "word" if word and not eeprom else "byte"
             return f"read the {size} at {_place(address, eeprom)}"
+        case _:
+            assert_never(message)
 
 
 def _speed(speed: int, rate: Rate) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from nodes.superstepper.engine import NS_PER_TICK
@@ -29,6 +29,17 @@ _COMMANDS = (
     start=st.sampled_from([32_000, 20_000, 4_000]),
     rate=st.sampled_from([0, 97, 1_000, 30_000]),
     time_base=st.sampled_from([0, 10, 60]),
+)
+@example(
+    # Too fast to come down from within the steps of a faster move.
+    commands=[
+        (MoveAtSpeed(True, 10_000), 1_500_000 * 3),
+        (MoveSteps(True, 5_000, 3), 900_000),
+        (MoveSteps(True, 5_000, 120), 900_000),
+    ],
+    start=32_000,
+    rate=256,
+    time_base=10,
 )
 @settings(max_examples=120)
 def test_it_moves_as_a_motor_that_makes_step_after_step(
@@ -110,3 +121,13 @@ def test_steps_end_on_the_last_one_and_mirror_the_way_up(steps: int) -> None:
     ticks = course.step_times(0, 1 << 40).tolist()
     gaps = [late - early for early, late in pairwise(ticks)]
     assert gaps == gaps[::-1]
+
+
+def test_there_are_no_steps_before_the_first_and_behind_the_last() -> None:
+    bench = Bench(3)
+    bench.execute(MoveSteps(True, 10_000, 3))
+    course = bench.node.commands.engine.course
+    assert course is not None
+    for wrong in (-1, 3):
+        with pytest.raises(IndexError, match=f"no step {wrong} in a course of 3"):
+            course.time_of(wrong)

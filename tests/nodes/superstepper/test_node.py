@@ -63,6 +63,8 @@ def test_jmp2_decides_on_the_mode_and_all_of_a_line_must_have_one() -> None:
     both = (NodeAt(3, "ss-mst67"), NodeAt(4, "ss-mst67", nine))
     with pytest.raises(SettingError, match=r"one protocol on a line, got superstepper \(node 3\)"):
         check(Configuration(nodes=both))
+    # A bus without nodes speaks what its settings say.
+    assert check(Configuration(nodes=(), kind="ss-mst67", settings=nine)) is found
     with pytest.raises(SettingError, match="addresses from 0 to 31, got 32"):
         check(Configuration(nodes=(32,), kind="ss-mst67"))
 
@@ -76,7 +78,12 @@ def test_jmp1_open_is_2400_baud_at_address_0_whatever_the_eeprom_says() -> None:
     ]
     deaf = Bench(0, jmp1="open")
     assert deaf.exchange("07 00 02") == ""
-    assert told(deaf) == ["it is set to 2400 baud, the line runs at 9600: it hears nothing"]
+    hears_nothing = ["it is set to 2400 baud, the line runs at 9600: it hears nothing"]
+    assert told(deaf) == hears_nothing
+    deaf.node.power(on=False, now=deaf.now)
+    assert told(deaf) == hears_nothing
+    deaf.node.power(on=True, now=deaf.now)
+    assert told(deaf) == hears_nothing * 2
 
 
 # ---- baud codes ----
@@ -238,6 +245,28 @@ def test_edges_of_its_outputs_are_told() -> None:
     bench.node.pins.watch(None, bench.now)
     bench.exchange("1b 00")
     assert len(edges) == 5
+
+
+def test_a_watcher_may_do_something_in_the_middle_of_what_it_is_told() -> None:
+    bench = Bench(3)
+    edges: list[tuple[str, int]] = []
+
+    def watch(pin: str, level: int, when: int) -> None:
+        edges.append((pin, level))
+        if pin == "ms0":
+            bench.node.power(on=False, now=when)
+
+    bench.node.pins.watch(watch, 0)
+    bench.exchange("1b 0f")
+    assert edges == [
+        ("ms0", 1),
+        ("dir", 0),
+        ("enable", 0),
+        ("ms0", 0),
+        ("ms1", 0),
+        ("dm0", 0),
+        ("dm1", 0),
+    ]
 
 
 def test_what_can_be_seen_of_it() -> None:
