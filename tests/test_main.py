@@ -54,6 +54,7 @@ GIVEN = {
     "export": ["/nonexistent", "--csv", "/nonexistent.csv"],
     "diff": ["/nonexistent", "/nonexistent"],
     "dissector": [],
+    "ss": ["/nonexistent", "3", "status"],
 }
 
 
