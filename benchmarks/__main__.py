@@ -8,7 +8,19 @@ import platform
 from collections.abc import Callable
 from dataclasses import asdict
 
-from benchmarks import bus, kernel, lateness, line, motion, pty, recording, tcp, wire
+from benchmarks import (
+    bus,
+    gcode,
+    kernel,
+    lateness,
+    line,
+    motion,
+    pty,
+    recording,
+    tcp,
+    transactions,
+    wire,
+)
 from benchmarks.figure import Figure
 from sacbus.wire import CRC_IS_FAST
 
@@ -16,11 +28,13 @@ BENCHMARKS: dict[str, Callable[[int], list[Figure]]] = {
     "wire": wire.figures,
     "kernel": kernel.figures,
     "motion": motion.figures,
+    "gcode": gcode.figures,
     "bus": bus.figures,
     "recording": recording.figures,
     "line": line.figures,
     "pty": pty.figures,
     "tcp": tcp.figures,
+    "transactions": transactions.figures,
     "lateness": lateness.figures,
 }
 

@@ -1,9 +1,10 @@
 """The server processes that benchmarks talk to: ``python -m benchmarks.server KIND [PATH]``.
 
-KIND is ``bus`` (paced), ``bus-unpaced``, ``tcp`` and ``tcp-many`` (unpaced), ``adapter`` (at PATH),
-or the least that any server must do in its place: ``pty-echo``, ``tcp-echo``, ``serial-echo`` (at
-PATH), ``select``. Prints where to connect; each line on its standard input is answered with the
-processor time used so far, in seconds.
+KIND is ``bus`` (paced), ``bus-unpaced``, ``tcp`` and ``tcp-many`` (unpaced), ``bus-pty-quick`` and
+``bus-tcp-quick`` (whose nodes answer at once, and are never deaf), ``adapter`` (at PATH),
+``modbus-pty`` and ``modbus-tcp`` (pymodbus), or the least that any server must do in its place:
+``pty-echo``, ``tcp-echo``, ``serial-echo`` (at PATH), ``select``. Prints where to connect; each
+line on its standard input is answered with the processor time used so far, in seconds.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ from sacbus.selector import real_loop
 #: on one their answers would collide with the requests behind them.
 MANY = tuple(range(10, 74))
 
+#: No gaps: nothing to wait for but the bytes.
+QUICK = {"turnaround": False, "deaf_time": False}
+
 BUSES: dict[str, Callable[[str], Configuration]] = {
     "bus": lambda _: Configuration(links=(PtyAt(),)),
     "bus-unpaced": lambda _: Configuration(links=(PtyAt(),), pace=False),
@@ -30,12 +34,18 @@ BUSES: dict[str, Callable[[str], Configuration]] = {
     "tcp-many": lambda _: Configuration(
         nodes=MANY, lanes=2, links=(TcpAt("127.0.0.1", 0),), pace=False
     ),
+    "bus-pty-quick": lambda _: Configuration(links=(PtyAt(),), pace=False, settings=QUICK),
+    "bus-tcp-quick": lambda _: Configuration(
+        links=(TcpAt("127.0.0.1", 0),), pace=False, settings=QUICK
+    ),
     "adapter": lambda path: Configuration(links=(AdapterAt(path),)),
 }
 BARE: dict[str, Callable[[str], Awaitable[object]]] = {
     "pty-echo": lambda _: bare.pty_echo(),
     "tcp-echo": lambda _: bare.tcp_echo(),
     "serial-echo": bare.serial_echo,
+    "modbus-pty": lambda _: _modbus("serve_pty"),
+    "modbus-tcp": lambda _: _modbus("serve_tcp"),
 }
 
 
@@ -48,6 +58,12 @@ async def serve_bus(configuration: Configuration) -> None:
 async def serve_bare(serving: Awaitable[object]) -> None:
     await serving
     await _tell_time()
+
+
+async def _modbus(serve: str) -> None:
+    from benchmarks import modbus  # noqa: PLC0415 (nobody else waits for it)
+
+    await getattr(modbus, serve)()
 
 
 async def _tell_time() -> None:

@@ -49,6 +49,8 @@ def as_text(examined: Examined) -> Iterator[str]:
         if bus.terminals:
             path = terminal_path(bus.links, "ADDRESS")
             yield "  terminals" if path is None else f"  terminals {path}"
+        if bus.watchdog:
+            yield "  watchdog"
         yield f"  state {'kept in memory only' if bus.state is None else bus.state / bus.name}"
 
 
@@ -78,6 +80,7 @@ def _bus(bus: Configuration) -> dict[str, Any]:
         "seed": bus.seed,
         "pace": bus.pace,
         "terminals": bus.terminals,
+        "watchdog": bus.watchdog,
         "speed": bus.speed,
         "state": None if bus.state is None else str(bus.state / bus.name),
         "nodes": [dataclasses.asdict(node) for node in bus.every_node],

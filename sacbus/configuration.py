@@ -46,6 +46,7 @@ class Configuration:
     protocol of ``kind``. ``baud`` and ``lanes`` override the protocol's. ``state``: the directory
     for the nodes' EEPROM, None keeps it in memory. ``speed`` scales bus time; ``pace`` False lets
     the line run ahead of the clock. ``terminals``: a pty for each node's terminal port.
+    ``watchdog``: nodes that move are stopped when the link of who has talked goes away.
     """
 
     nodes: tuple[NodeAt | int, ...] = (10, 11, 12)
@@ -60,6 +61,7 @@ class Configuration:
     speed: float = 1.0
     pace: bool = True
     terminals: bool = False
+    watchdog: bool = False
 
     @property
     def every_node(self) -> tuple[NodeAt, ...]:

@@ -7,7 +7,7 @@ the saving of the nodes' memory. How one is built is the daemon's business.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from functools import partial
 from random import Random
@@ -17,13 +17,15 @@ from sacbus.configuration import Configuration, NodeAt
 from sacbus.console import Console
 from sacbus.host import Host, VirtualHost
 from sacbus.kernel import SECOND, Ns
-from sacbus.links import Link, Tuning
+from sacbus.links import Link, TellingLink, Tuning
 from sacbus.links.link import Server
 from sacbus.mother import Mother
 from sacbus.node import BOOT, Heard, Node, Report, ReportKind, Snapshot
 from sacbus.panel import Deed, Panel
 from sacbus.saving import AtOnce, Saving, Soon
+from sacbus.shared_line import SharedLine
 from sacbus.state import StateDirectory, StateError
+from sacbus.watchdog import Watchdog
 
 __all__ = ["HostedBus", "NoTerminal"]
 
@@ -61,6 +63,7 @@ class HostedBus:
         self.deeds: list[Callable[[Node, Deed], object]] = []
         #: Nodes in the order of the configuration, whose addresses name their memory.
         self.configured = tuple(zip(configuration.every_node, bus.nodes, strict=True))
+        self._watchdog = Watchdog(bus, host, self.tell) if configuration.watchdog else None
 
     @property
     def talkers(self) -> int:
@@ -83,6 +86,13 @@ class HostedBus:
     def panel(self, address: int) -> Panel:
         """A node's pins, encoder, switch and terminal; NoSuchNode when there is none."""
         return self._panel(self.bus.node(address))
+
+    def shared_line(self, pin: str, addresses: Iterable[int]) -> SharedLine:
+        """A wire to the same pin of these nodes: ``"sync"``, ``"xclk"``, ``"estop"``.
+
+        NoSuchNode when there is none of them.
+        """
+        return SharedLine(pin, [self.panel(address) for address in addresses], self.host)
 
     def fault(self, fault: Fault) -> FaultOn:
         """Put a fault on the line now; what is given counts it and takes it :meth:`off`.
@@ -144,6 +154,7 @@ class HostedBus:
         LinkError when it cannot be had. It is closed with the bus.
         """
         port = self._seat(link, echo=echo, latency=latency)
+        self._mind(link, port)
         self.links.append(link)
         return port
 
@@ -162,22 +173,40 @@ class HostedBus:
         except BaseException:
             port.close()
             raise
+        self._mind(link, port)
         self.links.append(link)
         self._ports.append(port)
         return port
 
+    def _mind(self, link: Link, port: Port | LivePort) -> Callable[[], None] | None:
+        """Have the watchdog told when who talks over a link leaves; what tells it, if there is one.
+
+        To be told twice of the same is harmless.
+        """
+        if self._watchdog is None:
+            return None
+        left = self._watchdog.minds(link, port)
+        if isinstance(link, TellingLink):
+            link.left = left
+        return left
+
     async def let_in(self, server: Server, *, echo: bool = False, latency: Ns = LATENCY) -> None:
         """Open a server; everyone it lets in gets a port as from :meth:`attach`, while they stay.
 
-        What a program had said before it left is still sent.
+        What a program had said before it left is still sent, unless there is a watchdog.
         """
 
         def admit(link: Link) -> Callable[[], None]:
             port = self._seat(link, echo=echo, latency=latency)
+            left = self._mind(link, port)
 
             def gone() -> None:
                 self._ports.remove(port)
-                self._let_go(port)
+                if left is None:
+                    self._let_go(port)
+                else:
+                    port.close()
+                    left()
 
             return gone
 
@@ -258,6 +287,8 @@ class HostedBus:
 
     def close(self) -> None:
         """Let everybody go: links are closed, and mothers are told that the line is gone."""
+        if self._watchdog is not None:
+            self._watchdog.end()
         with ExitStack() as stack:  # the rest is closed also when a link cannot be
             stack.callback(self.host.close)
             for mother in self._mothers:

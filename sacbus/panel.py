@@ -96,6 +96,10 @@ class Panel:
         """The level of a pin now, whether it is driven or drives; xclk: Hz."""
         return self._pins().level(pin, self._host.catch_up())
 
+    def check(self, pin: str, level: int) -> None:
+        """PinError unless ``drive`` would take these."""
+        self._pins().check(pin, level)
+
     def drive(self, pin: str, level: int) -> None:
         """Drive an input to a level now; xclk: to a frequency in Hz."""
         pins = self._pins()

@@ -117,6 +117,7 @@ def test_what_is_right_is_told_as_json(capsys: Captured, file: Path) -> None:
         "seed": 0,
         "pace": True,
         "terminals": False,
+        "watchdog": False,
         "speed": 1.0,
         "state": f"{file.parent}/memory/bus",
     }

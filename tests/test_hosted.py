@@ -14,31 +14,33 @@ from sacbus.mother import MotherError
 from sacbus.selector import real_loop
 
 
-async def _lose_and_find(bus: HostedBus) -> None:
-    """Nobody answers while a fault is on, and everybody does before and after."""
+async def _lose_and_find(bus: HostedBus) -> int:
+    """Nobody answers while a fault is on, and everybody does before and after; what it counted."""
     mother = bus.mother()
     await mother.send(10, "v100")
     on = bus.fault(Dead(10))
     with pytest.raises(MotherError):
         await mother.send(10, "v100")
-    assert on.count == 3
     on.off()
+    count = on.count
     await mother.send(10, "v100")
-    assert on.count == 3
+    assert on.count == count
+    return count
 
 
-async def _scene() -> None:
+async def _scene() -> int:
     async with open_bus(Configuration(nodes=(10,))) as bus:
-        await _lose_and_find(bus)
+        return await _lose_and_find(bus)
 
 
 def test_a_fault_is_put_on_and_taken_off_in_virtual_time() -> None:
-    run_virtual(Kernel(), _scene())
+    assert run_virtual(Kernel(), _scene()) == 3  # an attempt and two retries
 
 
 def test_a_fault_is_put_on_and_taken_off_in_real_time() -> None:
     with asyncio.Runner(loop_factory=real_loop) as runner:
-        runner.run(_scene())
+        # A machine that is late has mother try again the first line as well.
+        assert runner.run(_scene()) >= 3
 
 
 @pytest.mark.slow

@@ -233,6 +233,17 @@ class SacNode:
 
     # ---- boots ----
 
+    def stop(self, now: Ns) -> None:
+        """Stop as by ``S``: no further pulse, and nothing of what waits; not while off or booting.
+
+        Whoever calls this has the bus ask the node anew when it wants to be woken.
+        """
+        self.now = now
+        if self._start is None:
+            self._commands.execute(Stop(grace=False), now)
+        if self._onlookers:
+            self.look(now)
+
     def power(self, *, on: bool, now: Ns) -> None:
         """Switch it off, or on again for a cold boot; nothing if it is that already.
 

@@ -18,7 +18,7 @@ from nodes.superstepper.pins import SuperStepperPins
 from nodes.superstepper.settings import SuperStepperSettings
 from sacbus.kernel import US, LineRate, Ns
 from sacbus.node import OFF, Heard, Report, ReportKind, Snapshot
-from sacbus.wire.superstepper import Message, describe
+from sacbus.wire.superstepper import Message, Stop, describe
 
 __all__ = ["SuperStepperNode"]
 
@@ -198,6 +198,13 @@ class SuperStepperNode:
                 "steps run": commands.steps_run(now),
             },
         )
+
+    def stop(self, now: Ns) -> None:
+        """Stop as by opcode 4 without deceleration: no further step; the current stays on."""
+        self.now = now
+        if self.powered:
+            self._commands.execute(Stop(decelerate=False, enabled=True), now)
+        self.look(now)
 
     def power(self, *, on: bool, now: Ns) -> None:
         """Switch it off, or on again; nothing if it is that already. It obeys at once [D].

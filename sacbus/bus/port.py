@@ -117,6 +117,14 @@ class Port:
         else:
             self._start()
 
+    def drop(self) -> None:
+        """Forget what waits for the line; what is being sent is sent to its end."""
+        self._buffer.clear()
+        if self._ninth is not None:
+            self._ninth.clear()
+        if self._held:
+            self._flow(held=False)
+
     def leave(self) -> None:
         """Hear nothing any more; what was said is still sent, as a UART sends on what it holds."""
         for lane in range(self._medium.lanes):
@@ -124,9 +132,7 @@ class Port:
 
     def close(self) -> None:
         """Leave the line. What is being sent is sent to its end; the rest is dropped."""
-        self._buffer.clear()
-        if self._ninth is not None:
-            self._ninth.clear()
+        self.drop()
         self.leave()
 
     def _start(self) -> None:

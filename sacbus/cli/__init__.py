@@ -14,10 +14,12 @@ import traceback
 import click
 
 from sacbus import __version__
+from sacbus.cli.calibrate import calibrate_command
 from sacbus.cli.check import check_command
 from sacbus.cli.diff import diff_command
 from sacbus.cli.dissector import dissector_command
 from sacbus.cli.eeprom import eeprom_group
+from sacbus.cli.estop import estop_command
 from sacbus.cli.export import export_command
 from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
@@ -25,6 +27,7 @@ from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, help_unless_asked, sho
 from sacbus.cli.plan import plan_command
 from sacbus.cli.queue import queue_group
 from sacbus.cli.run import run_command
+from sacbus.cli.scan import scan_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
 from sacbus.cli.ss import ss_group
@@ -54,11 +57,14 @@ for command in (
     serve_command,
     send_command,
     ss_group,
+    estop_command,
+    scan_command,
     terminal_command,
     monitor_command,
     run_command,
     plan_command,
     queue_group,
+    calibrate_command,
     export_command,
     diff_command,
     check_command,

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from sacbus.cli.drive import drive_options
 from sacbus.cli.options import WrongInput, verbose
 
 __all__ = ["plan_command"]
@@ -30,27 +31,7 @@ __all__ = ["plan_command"]
     metavar="N",
     help="Run the whole N times.",
 )
-@click.option(
-    "--ustep",
-    type=click.IntRange(0, 7),
-    default=0,
-    show_default=True,
-    help="Microsteps, as a power of two.",
-)
-@click.option(
-    "--sprf",
-    type=click.IntRange(1, 65_535),
-    default=200,
-    show_default=True,
-    help="Full steps per revolution.",
-)
-@click.option(
-    "--slow",
-    type=click.IntRange(1, 255),
-    default=10,
-    show_default=True,
-    help="RPM up to which there are no ramps.",
-)
+@drive_options
 @click.option(
     "--start-rpm",
     type=click.IntRange(0, 2**32 - 1),

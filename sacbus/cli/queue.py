@@ -9,11 +9,10 @@ from pathlib import Path
 import click
 
 from sacbus.cli.options import NO_ANSWER_STATUS, baud, help_unless_asked, verbose
+from sacbus.cli.queue_put import put_command
+from sacbus.cli.rows import STANDARD, opened_rows
 
 __all__ = ["queue_group"]
-
-STANDARD = "-"
-"""The name of standard output."""
 
 
 @click.group("queue", invoke_without_command=True)
@@ -23,9 +22,14 @@ def queue_group(context: click.Context) -> int | None:
     """Queue files, as the companion reads and writes them.
 
     \b
-    Example: sacbus queue get /tmp/sacbus-10 queue.csv
+    Example: sacbus queue put /tmp/sacbus 10 queue.csv
+             sacbus queue get /tmp/sacbus-10 queue.csv
+             sacbus queue compare /tmp/sacbus-10 queue.csv
     """
     return help_unless_asked(context)
+
+
+queue_group.add_command(put_command)
 
 
 @queue_group.command("get")
@@ -74,3 +78,53 @@ def get_command(terminal: str, file: str, baud: int, as_json: bool) -> int:
     else:
         click.echo(f"{len(screen.rows)} positions written to {file}; Q is at {screen.next_free}")
     return 0
+
+
+@queue_group.command("compare")
+@click.argument("terminal")
+@click.argument("file", metavar="FILE.csv")
+@click.option(
+    "--sprf",
+    type=click.IntRange(1, 65_535),
+    default=200,
+    show_default=True,
+    help="Full steps per revolution, by which RPM and cycle of the file go together.",
+)
+@baud
+@click.option("--json", "as_json", is_flag=True, help="Report as JSON.")
+@verbose
+def compare_command(terminal: str, file: str, sprf: int, baud: int, as_json: bool) -> int:
+    """Compare the queue of a SAC with a file, position by position; a FILE of - is standard input.
+
+    TERMINAL is a SAC's terminal port, as for sacbus queue get. Positions that the file does not
+    name may hold anything. Status: 0 when all are as in the file, 1 when not, with a line for each
+    difference, or when what answers has no queue; 4 when nobody answers.
+
+    \b
+    Example: sacbus queue compare /tmp/sacbus-10 queue.csv
+    """
+    from sacbus.language import Defaults
+    from sacbus.mother import differences
+    from sacbus.terminal.dialog import NoAnswer
+    from sacbus.terminal.queue import read_queue
+
+    with opened_rows(file, Defaults(sprf=sprf)) as rows:
+        try:
+            screen = asyncio.run(read_queue(terminal, baud))
+        except NoAnswer as fault:
+            click.echo(f"error: {fault}", err=True)
+            return NO_ANSWER_STATUS
+        found = list(differences(screen.rows, rows))
+        count = rows.count
+    if as_json:
+        told = [
+            {"position": one.position, "field": one.field, "got": one.got, "expected": one.wanted}
+            for one in found
+        ]
+        report = {"terminal": terminal, "file": file, "rows": count, "differences": told}
+        click.echo(json.dumps(report))
+    elif found:
+        click.echo("\n".join(map(str, found)))
+    else:
+        click.echo(f"{count} positions are as in {file}")
+    return 1 if found else 0

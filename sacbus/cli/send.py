@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-from typing import Final
 
 import click
 
 from sacbus.cli.options import NO_ANSWER_STATUS, baud, verbose
+from sacbus.cli.outcomes import NAK_STATUS, UNKNOWN_STATUS
 
 __all__ = ["send_command"]
-
-#: Exit statuses (spec, cli).
-NAK_STATUS: Final = 3
-UNKNOWN_STATUS: Final = 5
 
 
 @click.command("send")

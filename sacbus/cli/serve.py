@@ -77,6 +77,11 @@ __all__ = ["serve_command"]
     is_flag=True,
     help="A pty for each node's terminal too: PATH-10 beside the first --pty PATH.",
 )
+@click.option(
+    "--watchdog",
+    is_flag=True,
+    help="Stop nodes that move when the link of a program that has talked goes away.",
+)
 @click.option("--rts", is_flag=True, help="Adapters switch their direction by RTS.")
 @click.option(
     "--baud",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from sacbus.cli.options import NO_ANSWER_STATUS, verbose
-from sacbus.cli.send import NAK_STATUS, UNKNOWN_STATUS
+from sacbus.cli.outcomes import NAK_STATUS, UNKNOWN_STATUS
 
 if TYPE_CHECKING:
     from sacbus.wire.superstepper import Answer, Message

@@ -205,6 +205,11 @@ BUS: Final = (
         "a pty for each node's terminal: PATH-10 beside the first link with a path",
         default=False,
     ),
+    _flag(
+        "watchdog",
+        "stop nodes that move when the link of a program that has talked goes away",
+        default=False,
+    ),
     Key(
         "state",
         "a directory, or false to keep nothing",

@@ -106,4 +106,4 @@ def _configuration(bus: BusDraft, speed: float) -> Configuration:
 
 
 #: Keys of a bus that are values of its configuration under the same names.
-_AS_IT_IS = ("baud", "lanes", "seed", "pace", "terminals")
+_AS_IT_IS = ("baud", "lanes", "seed", "pace", "terminals", "watchdog")

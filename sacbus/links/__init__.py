@@ -7,7 +7,7 @@ of programs at once, each with a link of its own: `tcp.TcpServer` and `rfc2217.R
 
 from .client import Line, open_line
 from .errors import LinkError, PathTaken
-from .link import FormattedLink, Link, LinkCounters, SerialFormat, Server
+from .link import FormattedLink, Link, LinkCounters, SerialFormat, Server, TellingLink
 from .memory import MemoryClient, MemoryLink
 from .presence import Presence
 from .pty import PtyLink
@@ -26,6 +26,7 @@ __all__ = [
     "PtyLink",
     "SerialFormat",
     "Server",
+    "TellingLink",
     "Tuning",
     "open_line",
 ]

@@ -81,6 +81,8 @@ class AdapterLink:
         self._settling: asyncio.TimerHandle | None = None
         self._told = 0  # collisions
         self._quiet: asyncio.TimerHandle | None = None
+        #: As TellingLink.left: what is on its line cannot be heard any more.
+        self.left: Callable[[], object] | None = None
 
     @property
     def counters(self) -> LinkCounters:
@@ -204,6 +206,8 @@ class AdapterLink:
             self._delay = FIRST_RETRY
         self._turned = now
         self._tell(f"adapter {self.where} is gone ({why}); trying to reach it again")
+        if self.left is not None:
+            self.left()
         if self._deliver is not None:  # unless that has been the end
             self._arrival = Arrival(self.where, self._found)
             self._retry = self._loop.call_later(self._delay, self._try_again)

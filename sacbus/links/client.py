@@ -39,6 +39,9 @@ class Wire(Protocol):
     def send(self, data: bytes) -> object:
         """Write without waiting."""
 
+    def set_dtr(self, *, asserted: bool) -> bool:
+        """Set a spare output; False where there is none."""
+
     def close(self) -> object:
         """Close without waiting for anything. Idempotent."""
 
@@ -91,6 +94,10 @@ class Line:
         """As :meth:`send`, with a ninth bit of 0 or 1 for each byte; one call at a time."""
         if isinstance(self._wire, MarkingWire):
             self._wire.send_marked(data, ninth)
+
+    def set_dtr(self, *, asserted: bool) -> bool:
+        """Set the DTR output of a serial port, now; False where there is none, or it is gone."""
+        return self._wire is not None and self._wire.set_dtr(asserted=asserted)
 
     def close(self) -> None:
         """Close the line at once. Idempotent."""
@@ -255,6 +262,9 @@ class _Socket(asyncio.Protocol):
             return
         if transport.get_write_buffer_size() + len(data) <= BOUND:
             transport.write(data)
+
+    def set_dtr(self, *, asserted: bool) -> bool:  # noqa: ARG002 (as other wires)
+        return False
 
     def close(self) -> None:
         if self._transport is not None:

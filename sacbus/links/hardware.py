@@ -18,7 +18,7 @@ from serial.rs485 import RS485Settings
 if sys.platform != "win32":
     import fcntl
 
-__all__ = ["FramingErrors", "hasten", "kernel_direction", "set_rts"]
+__all__ = ["FramingErrors", "hasten", "kernel_direction", "set_dtr", "set_rts"]
 
 # asm-generic/ioctls.h and linux/serial.h.
 _TIOCGRS485: Final = 0x542E
@@ -64,6 +64,15 @@ def set_rts(port: serial.Serial, *, high: bool) -> bool:
     """Set RTS; False where the port has none (ENOTTY), or is gone."""
     try:
         port.rts = high
+    except OSError:
+        return False
+    return True
+
+
+def set_dtr(port: serial.Serial, *, asserted: bool) -> bool:
+    """Set DTR, which RS485 leaves to other uses; False where the port has none, or is gone."""
+    try:
+        port.dtr = asserted
     except OSError:
         return False
     return True

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-__all__ = ["FormattedLink", "Link", "LinkCounters", "SerialFormat", "Server"]
+__all__ = ["FormattedLink", "Link", "LinkCounters", "SerialFormat", "Server", "TellingLink"]
 
 
 @dataclass(slots=True)
@@ -104,6 +104,19 @@ class FormattedLink(Link, Protocol):
 
     def client_format(self) -> SerialFormat:
         """What the client has set; called often, so it must cost next to nothing."""
+
+
+@runtime_checkable
+class TellingLink(Link, Protocol):
+    """A link that tells when its client is gone, while it lasts itself.
+
+    A pty outlives its programs, and an adapter goes on when it is plugged in again; what a server
+    lets in may still want answers after it has said its last word, and is told of as soon as that.
+    """
+
+    left: Callable[[], object] | None
+    """Called when the last client has said all that it ever will, and that has been delivered; also
+    when another one came in the same instant. Not when the link is closed. None: nobody is told."""
 
 
 class Server(Protocol):

@@ -28,6 +28,7 @@ class _Wire:
     deliver: Callable[[bytes], None] | None = None
     held: bool = False
     client: MemoryClient | None = None
+    left: Callable[[], object] | None = None
     unread: bytearray = field(default_factory=bytearray)
 
     def hang_up(self) -> None:
@@ -74,6 +75,8 @@ class MemoryClient:
         """Leave; what is unread is dropped and counted. May be called again."""
         if self._wire.client is self:
             self._wire.hang_up()
+            if self._wire.left is not None:
+                self._wire.left()
 
 
 class MemoryLink:
@@ -91,6 +94,15 @@ class MemoryLink:
     @property
     def where(self) -> str:
         return self._wire.where
+
+    @property
+    def left(self) -> Callable[[], object] | None:
+        """As TellingLink.left."""
+        return self._wire.left
+
+    @left.setter
+    def left(self, left: Callable[[], object] | None) -> None:
+        self._wire.left = left
 
     @property
     def counters(self) -> LinkCounters:

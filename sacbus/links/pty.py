@@ -75,6 +75,8 @@ class PtyLink:
         self._opens = 0  # clients that have it open, as far as hints can tell
         self._sent = False  # whether the present clients may have something unread
         self._held = False
+        #: As TellingLink.left; not where the system does not tell who is there.
+        self.left: Callable[[], object] | None = None
 
     @property
     def where(self) -> str:
@@ -196,6 +198,7 @@ class PtyLink:
             with self._presence.unseen(pair.path), contextlib.suppress(OSError):
                 self.counters.dropped_out += pair.drain()  # unless exclusive to the second
             self._sent = False
+        self._tell_left()
 
     def _readable(self) -> None:
         # First the hints: what a new client writes must be heard after the old one's leaving.
@@ -215,6 +218,7 @@ class PtyLink:
 
     def _everybody_left(self, pair: PtyPair) -> None:
         self._gone(pair)
+        self._tell_left()
         try:
             with self._presence.unseen(pair.path):
                 self.counters.dropped_out += pair.reset()
@@ -224,6 +228,10 @@ class PtyLink:
             self._replace(pair)
         else:
             self._look(pair)  # who came meanwhile was not hinted
+
+    def _tell_left(self) -> None:
+        if self.left is not None:
+            self.left()
 
     def _replace(self, pair: PtyPair) -> None:
         """Go on with a new pty, since a client was killed and has left this one exclusive for good.

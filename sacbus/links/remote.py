@@ -196,6 +196,10 @@ class RemotePort:
             self._marked += runs(data, ninth)
             self._work.notify()
 
+    def set_dtr(self, *, asserted: bool) -> bool:  # noqa: ARG002 (as other wires)
+        """Not here: when a server would have set it nobody knows."""
+        return False
+
     def close(self) -> None:
         """Have it closed, behind what waits to be written. Idempotent."""
         with self._work:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from .link import Link, LinkCounters, SerialFormat
+from .link import Link, LinkCounters, SerialFormat, TellingLink
 from .tcp import TcpServer
 from .telnet import Telnet
 
@@ -58,6 +58,16 @@ class Rfc2217Link:
     def client_format(self) -> SerialFormat:
         """Data bits, parity and stop bits that the program has set; 8N1 before."""
         return SerialFormat() if self._telnet is None else self._telnet.port.format
+
+    @property
+    def left(self) -> Callable[[], object] | None:
+        """As TellingLink.left, which its stream knows of."""
+        return self._stream.left if isinstance(self._stream, TellingLink) else None
+
+    @left.setter
+    def left(self, left: Callable[[], object] | None) -> None:
+        if isinstance(self._stream, TellingLink):
+            self._stream.left = left
 
     def close(self) -> None:
         self._deliver = None

@@ -35,6 +35,7 @@ import serial_asyncio
 
 from .client import no_ninth_bits
 from .errors import LinkError
+from .hardware import set_dtr
 from .marking import PARITIES, runs
 
 if sys.platform != "win32":
@@ -200,6 +201,10 @@ class SerialConnection(asyncio.Protocol):
         except FAULTS as fault:
             if not self._ended:
                 self._loop.call_soon_threadsafe(self._failed, _words(fault))
+
+    def set_dtr(self, *, asserted: bool) -> bool:
+        """Set the DTR output now; False where there is none, or the port is gone."""
+        return not self._ended and set_dtr(self.port, asserted=asserted)
 
     def hold(self, *, held: bool) -> None:
         """Read no more, or go on. A port that is unplugged meanwhile is noticed afterwards."""

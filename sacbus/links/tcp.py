@@ -91,6 +91,8 @@ class TcpLink(asyncio.BufferedProtocol):
         self._full = False  # the system takes no more, and the transport keeps what is sent
         self._kept = 0  # what it kept after the last chunk
         self._ending: asyncio.TimerHandle | None = None
+        #: As TellingLink.left; told once.
+        self.left: Callable[[], object] | None = None
 
     def open(self, deliver: Callable[[bytes], None]) -> None:
         if self._transport is None:
@@ -172,6 +174,7 @@ class TcpLink(asyncio.BufferedProtocol):
 
     def eof_received(self) -> bool:
         """asyncio's: the program will write no more. It may still want its answers."""
+        self._tell_left()
         self._linger(self._traffic())
         return True
 
@@ -195,6 +198,7 @@ class TcpLink(asyncio.BufferedProtocol):
         try:
             if exc is not None:
                 self._hear_the_rest(self._transport)
+            self._tell_left()
         finally:
             self._end()
 
@@ -217,6 +221,11 @@ class TcpLink(asyncio.BufferedProtocol):
                 if count == 0:
                     return
                 self.buffer_updated(count)
+
+    def _tell_left(self) -> None:
+        left, self.left = self.left, None
+        if left is not None:
+            left()
 
     def _linger(self, before: int) -> None:
         """Hang up if, LINGER from now, no byte has passed since ``before``."""

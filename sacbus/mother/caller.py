@@ -1,8 +1,9 @@
 """Transactions: one request at a time on a half-duplex line, and what becomes of it.
 
-Owns whose turn it is, when an answer is overdue, what may be asked again, and the pause after each
-packet. Synchronous; a clock is handed in (the kernel, or a loop's), bytes go out through a callable
-and come in through :meth:`Caller.hear`. Source: spec, mother ("Transactions").
+Owns whose turn it is, when an answer is overdue, what may be asked again, the pause after each
+packet, and what an emergency stop does to those who wait. Synchronous; a clock is handed in (the
+kernel, or a loop's), bytes go out through a callable and come in through :meth:`Caller.hear`.
+Source: spec, mother ("Transactions", "Safety").
 """
 
 from __future__ import annotations
@@ -11,14 +12,19 @@ from collections import defaultdict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
-from typing import Protocol as Contract
 
 from sacbus.kernel import MS, LineRate, Ns
 from sacbus.language import repeatable
-from sacbus.mother.errors import LineLost, MotherError, NoAnswer, Refused, UnknownOutcome
+from sacbus.mother.clock import Clock
+from sacbus.mother.errors import LineLost, MotherError
+from sacbus.mother.estop import EmergencyStop
+from sacbus.mother.outcome import Acknowledged, Done, Sent
+from sacbus.mother.pending import Request
 from sacbus.mother.request import checked_address, safe_body
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
+    DC1,
+    DC2,
     GENERAL_CALL,
     MOTHER,
     Answer,
@@ -29,56 +35,35 @@ from sacbus.wire import (
 )
 from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
 
-__all__ = ["Acknowledged", "Caller", "Clock", "Sent"]
+__all__ = ["SLACK", "TRIES", "Caller", "SoftOpHeard"]
 
 #: How long an answer may be late beyond the line's own figures, on a line in this process, once
 #: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
 
+#: The bodies of soft ops.
+_SOFT_OPS: Final = (bytes((DC1,)), bytes((DC2,)))
+
+#: What makes a packet of a body: STX, two addresses, ETX, CRC, NUL.
+FRAME_BYTES: Final = 6
+
+#: The space that a body may need for its CRC.
+_PADDING: Final = 1
+
 #: Attempts for what may be repeated.
 TRIES: Final = 3
 
 
-class Clock(Contract):
-    """Time and appointments; a :class:`~sacbus.kernel.Kernel` is one."""
-
-    @property
-    def now(self) -> Ns:
-        """Ns since some start."""
-        ...
-
-    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
-        """Call back then."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
-class Acknowledged:
-    """A node has a packet: after how many attempts, and the last one's round trip in ns."""
+class SoftOpHeard:
+    """A node tells everybody that a command of its begins (DC1) or has ended (DC2).
+
+    at: when mother had the whole packet, ns by her clock; always as long after the event itself.
+    """
 
     node: int
-    attempts: int
-    round_trip: Ns
-
-
-@dataclass(frozen=True, slots=True)
-class Sent:
-    """A broadcast is out, and its pause over; nobody answers one."""
-
-
-@dataclass(slots=True)
-class _Request:
-    node: int
-    body: bytes
-    data: bytes
-    done: Callable[[Acknowledged | Sent | MotherError], None]
-    #: Whether it may run twice: the caller said so, or, as looked up at silence, the line may.
-    may_repeat: bool
-    attempts: int = 0
-    refusals: int = 0
-    sent_at: Ns = 0
-    last: str = "none"
-    withdrawn: bool = False
+    begins: bool
+    at: Ns
 
 
 class Caller:
@@ -86,6 +71,8 @@ class Caller:
 
     ``slack`` is how much later than the line's own figures an answer may come. ``unsent``, where it
     can be known, tells how many bytes still wait for the line: while any do, no answer is late.
+    ``gap`` is left free after every answer and broadcast, for a SAC is deaf then: 0 only where no
+    node is (``deaf_time`` off), or nothing but speed matters.
     """
 
     def __init__(
@@ -97,6 +84,7 @@ class Caller:
         slack: Ns = SLACK,
         unsent: Callable[[], int] | None = None,
         tries: int = TRIES,
+        gap: Ns = MOTHER_GAP,
     ) -> None:
         self._clock = clock
         self._send = send
@@ -104,29 +92,43 @@ class Caller:
         self._slack = slack
         self._unsent = unsent
         self._tries = tries
+        self._gap = gap
         self._receiver = PacketReceiver()
-        self._waiting: deque[_Request] = deque()
-        self._outstanding: _Request | None = None
-        #: When the outstanding request's answer is overdue, and whether a look at it is appointed.
-        #: One at a time: nearly all answers come in time, and nearly all requests do without an
-        #: appointment of their own.
+        self._waiting: deque[Request] = deque()
+        self._outstanding: Request | None = None
+        #: When the outstanding request's answer is overdue, and for when the next look at it is
+        #: appointed. Nearly all answers come in time, and nearly all requests do with the
+        #: appointment of one before.
         self._due: Ns = 0
-        self._watching = False
+        self._look_at: Ns | None = None
+        #: When an answer is due by the line's own figures, after how long, by the body's size.
+        self._expected: dict[int, Ns] = {}
+        #: Nodes that were given up before all of the slack was over, and when that is.
+        self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
         self._pausing = False
-        self._broadcasting: _Request | None = None
+        self._broadcasting: Request | None = None
+        #: The emergency stop that is under way, and who waits for its end.
+        self._stop: EmergencyStop | None = None
+        self._stopping: list[Done] = []
         self._lost: LineLost | None = None
         self.statistics: defaultdict[int, NodeStatistics] = defaultdict(NodeStatistics)
         #: Packets of others, answers that nobody waits for, and line faults, counted.
         self.overheard = 0
         self.strays = 0
         self.faults = 0
+        #: Emergency stops so far: who is in the middle of several calls sees by it that one came.
+        self.stops = 0
+        #: Called with each soft op of a node's. Empty it is no more than counted.
+        self.soft_op_listeners: list[Callable[[SoftOpHeard], object]] = []
+        #: Called with the node of each answer to mother that nobody waits for.
+        self.stray_watchers: list[Callable[[int], object]] = []
 
     def call(
         self,
         node: int,
         line: bytes,
-        done: Callable[[Acknowledged | Sent | MotherError], None],
+        done: Done,
         *,
         accept_duplicates: bool = False,
     ) -> None:
@@ -139,31 +141,78 @@ class Caller:
         checked_address(node)
         body = safe_body(line)
         self._enqueue(
-            _Request(
+            Request(
                 node,
                 body,
                 encode(node, MOTHER, body),
                 done,
                 accept_duplicates,
+                self._tries,
+                self._slack,
             )
         )
 
-    def broadcast(
-        self, line: bytes, done: Callable[[Acknowledged | Sent | MotherError], None]
-    ) -> None:
+    def probe(self, node: int, slack: Ns, done: Done) -> None:
+        """Ask once, with the empty line, whether anybody is at ``node``, and wait ``slack`` only.
+
+        An answer that comes later is a stray. Nothing else is sent to that node before the usual
+        slack is over, so that it is never taken for the answer to that.
+        """
+        checked_address(node)
+        data = encode(node, MOTHER, b"")
+        self._enqueue(
+            Request(node, b"", data, done, may_repeat=True, tries=1, slack=min(slack, self._slack))
+        )
+
+    def broadcast(self, line: bytes, done: Done) -> None:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
         body = safe_body(line)
         self._enqueue(
-            _Request(
+            Request(
                 GENERAL_CALL,
                 body,
                 encode(GENERAL_CALL, MOTHER, body),
                 done,
                 may_repeat=False,
+                tries=1,
+                slack=0,
             )
         )
 
-    def withdraw(self, done: Callable[[Acknowledged | Sent | MotherError], None]) -> None:
+    def estop(self, done: Done) -> None:
+        """Have everybody stop now: S at once and twice more, whatever is outstanding.
+
+        Nothing is waited for. What waits for its turn is not sent any more and ends as
+        :class:`Stopped`, or, where it was sent before, as what is known of that; what is
+        outstanding ends as it does, but is not sent again. ``done`` comes when the line is free.
+        What is asked from now on has its turn after that.
+        """
+        if self._lost is not None:
+            done(self._lost)
+            return
+        self.stops += 1
+        self._stopping.append(done)
+        if self._stop is None:
+            self._stop = EmergencyStop(
+                self._clock, self._send_stop, self._rate, self._unsent, self._stopped
+            )
+            on_its_way = self._outstanding or self._broadcasting
+            self._stop.begin(
+                0
+                if on_its_way is None
+                else on_its_way.sent_at + self._rate.span(len(on_its_way.data))
+            )
+        else:
+            self._stop.again()
+        if self._outstanding is not None:
+            self._outstanding.withdrawn = True
+        waiting = tuple(self._waiting)
+        self._waiting.clear()
+        # Only now, for those who are told may ask for more.
+        for request in waiting:
+            request.done(request.failure())
+
+    def withdraw(self, done: Done) -> None:
         """Nobody waits any more for the request of this ``done``.
 
         What has not been sent never will be. What has cannot be called back: the line stays taken
@@ -185,6 +234,8 @@ class Caller:
                 self.faults += 1
             elif type(event) is Packet and event.src != MOTHER:
                 self.overheard += 1
+                if self.soft_op_listeners and event.dest == GENERAL_CALL:
+                    self._soft_op(event)
 
     @property
     def lost(self) -> LineLost | None:
@@ -197,11 +248,14 @@ class Caller:
         waiting = [self._outstanding, self._broadcasting, *self._waiting]
         self._outstanding = self._broadcasting = None
         self._waiting.clear()
+        if self._stop is not None:
+            self._stop.end()
+        self._end_stop(self._lost)
         for request in waiting:
             if request is not None:
                 request.done(self._lost)
 
-    def _enqueue(self, request: _Request) -> None:
+    def _enqueue(self, request: Request) -> None:
         if self._lost is not None:
             request.done(self._lost)
             return
@@ -210,14 +264,28 @@ class Caller:
 
     def _next(self) -> None:
         """Send the next request if the line is ours."""
-        if self._outstanding is None and not self._pausing and self._waiting:
+        if (
+            self._outstanding is None
+            and not self._pausing
+            and self._waiting
+            and self._stop is None
+            and not (self._unsettled and self._may_still_answer(self._waiting[0].node))
+        ):
             self._attempt(self._waiting.popleft())
 
-    def _attempt(self, request: _Request) -> None:
+    def _may_still_answer(self, node: int) -> bool:
+        """Whether an answer of ``node`` to a probe may yet come; then it is waited for first."""
+        until = self._unsettled.pop(node, 0)
+        if until <= self._clock.now:
+            return False
+        self._pausing = True
+        self._clock.at(until, self._pause_over)
+        return True
+
+    def _attempt(self, request: Request) -> None:
         request.attempts += 1
         clock = self._clock
         request.sent_at = now = clock.now
-        line_time = self._rate.span(len(request.data))
         statistics = self.statistics[request.node]
         statistics.sent += 1
         if request.attempts > 1:
@@ -225,72 +293,108 @@ class Caller:
         if request.node == GENERAL_CALL:
             self._pausing = True
             self._broadcasting = request
-            clock.at(now + line_time + MOTHER_GAP, self._broadcast_over)
+            line_time = self._rate.span(len(request.data))
+            clock.at(now + line_time + self._gap, self._broadcast_over)
         else:
             self._outstanding = request
             self._due = now + self._patience(request)
-            if not self._watching:
-                self._watching = True
+            if self._look_at is None or self._due < self._look_at:
+                self._look_at = self._due
                 clock.at(self._due, self._look)
         self._send(request.data)
+
+    def _soft_op(self, packet: Packet) -> None:
+        if packet.body not in _SOFT_OPS:
+            return
+        heard = SoftOpHeard(packet.src, packet.body[0] == DC1, self._clock.now)
+        for listener in tuple(self.soft_op_listeners):
+            listener(heard)
 
     def _answered(self, answer: Answer) -> None:
         request = self._outstanding
         if request is None or answer.dest != MOTHER or answer.src != request.node:
             self.strays += 1
+            if answer.dest == MOTHER:
+                for watcher in self.stray_watchers:
+                    watcher(answer.src)
             return
         self._outstanding = None
         statistics = self.statistics[request.node]
-        self._pause()
         if answer.accepted:
             round_trip = self._clock.now - request.sent_at
             statistics.acks += 1
             statistics.round_trips.append(round_trip)
+            self._pause()
             request.done(Acknowledged(request.node, request.attempts, round_trip))
             return
         statistics.naks += 1
         request.last = "NAK"
         request.refusals += 1
-        if request.attempts < self._tries and not request.withdrawn:
+        if request.again:
             self._waiting.appendleft(request)
+            self._pause()
         else:
-            request.done(self._failure(request))
+            self._pause()
+            request.done(request.failure())
 
     def _look(self) -> None:
         """See whether the answer that we wait for is overdue."""
-        self._watching = False
+        now = self._clock.now
+        if self._look_at is None or self._look_at > now:
+            return  # one that an earlier one has made needless
+        self._look_at = None
         request = self._outstanding
         if request is None:
             return
-        if self._due <= self._clock.now and self._unsent is not None and self._unsent():
-            self._due = self._clock.now + self._patience(request)
-        if self._due > self._clock.now:
-            # Another one than the look was for; it always is due later than that.
-            self._watching = True
+        if self._due <= now and self._unsent is not None and self._unsent():
+            self._due = now + self._patience(request)
+        if self._due > now:
+            # Another one than the look was for.
+            self._look_at = self._due
             self._clock.at(self._due, self._look)
         else:
             self._silent(request)
 
-    def _patience(self, request: _Request) -> Ns:
-        """How long an answer may take, from the packet's first bit on."""
-        answer = turnaround(len(request.body), nul_follows=True) + self._rate.span(ANSWER_BYTES)
-        return self._rate.span(len(request.data)) + answer + self._slack
+    def longest_call(self, body: int) -> Ns:
+        """How long a call may take once it is its turn, if every attempt but the last fails.
 
-    def _silent(self, request: _Request) -> None:
+        For a line of ``body`` bytes; on a line that takes at once what it is given.
+        """
+        attempt = self._line_time(body + _PADDING) + self._slack + self._gap
+        return self._gap + self._tries * attempt
+
+    def _patience(self, request: Request) -> Ns:
+        """How long an answer may take, from the packet's first bit on."""
+        return self._line_time(len(request.body)) + request.slack
+
+    def _line_time(self, body: int) -> Ns:
+        """From the first bit of a packet to the last of its answer, by the line's own figures."""
+        known = self._expected.get(body)
+        if known is None:
+            answer = turnaround(body, nul_follows=True) + self._rate.span(ANSWER_BYTES)
+            known = self._expected[body] = self._rate.span(body + FRAME_BYTES) + answer
+        return known
+
+    def _silent(self, request: Request) -> None:
         self._outstanding = None
         self.statistics[request.node].timeouts += 1
         request.last = "silence"
         request.may_repeat = request.may_repeat or repeatable(request.body)
-        if request.may_repeat and request.attempts < self._tries and not request.withdrawn:
+        if request.slack < self._slack:
+            self._unsettled[request.node] = self._clock.now + self._slack - request.slack
+        if request.may_repeat and request.again:
             self._waiting.appendleft(request)
         else:
-            request.done(self._failure(request))
+            request.done(request.failure())
         self._next()
 
     def _pause(self) -> None:
-        """Leave the node the time in which it is deaf."""
-        self._pausing = True
-        self._clock.at(self._clock.now + MOTHER_GAP, self._pause_over)
+        """Leave the node the time in which it is deaf, then go on."""
+        if self._gap:
+            self._pausing = True
+            self._clock.at(self._clock.now + self._gap, self._pause_over)
+        else:
+            self._next()
 
     def _pause_over(self) -> None:
         self._pausing = False
@@ -303,12 +407,17 @@ class Caller:
             request.done(Sent())
         self._next()
 
-    def _failure(self, request: _Request) -> MotherError:
-        """What is known in the end: NAK says that it was not executed, silence says nothing."""
-        kind: type[Refused | NoAnswer | UnknownOutcome] = UnknownOutcome
-        if request.refusals == request.attempts:
-            kind = Refused
-        elif request.may_repeat and not request.refusals:
-            kind = NoAnswer
-        line = request.body.decode("latin-1").rstrip(" ")
-        return kind(request.node, line, request.attempts, request.last)
+    def _send_stop(self, data: bytes) -> None:
+        self.statistics[GENERAL_CALL].sent += 1
+        self._send(data)
+
+    def _stopped(self) -> None:
+        """The last S is out, and every node hears again."""
+        self._end_stop(Sent())
+        self._next()
+
+    def _end_stop(self, outcome: Sent | MotherError) -> None:
+        self._stop = None
+        waiting, self._stopping = self._stopping, []
+        for done in waiting:
+            done(outcome)

@@ -5,12 +5,26 @@ MotherError                        everything below
 ├── Refused                        the node answered NAK, every time
 ├── NoAnswer (TimeoutError)        silence, and what was asked may safely be asked again
 ├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
+├── NotStarted                     of several that were to start together, none has
+├── Stopped                        an emergency stop came before its turn; never sent
 └── LineLost (ConnectionError)     the link is gone
+
+What only one file raises is there: NoSoftOp (calibration), LostTrack (queue streams), and of
+BadRequest RowRefused (queue files) and NotStreamable.
 """
 
 from __future__ import annotations
 
-__all__ = ["BadRequest", "LineLost", "MotherError", "NoAnswer", "Refused", "UnknownOutcome"]
+__all__ = [
+    "BadRequest",
+    "LineLost",
+    "MotherError",
+    "NoAnswer",
+    "NotStarted",
+    "Refused",
+    "Stopped",
+    "UnknownOutcome",
+]
 
 
 class MotherError(Exception):
@@ -57,6 +71,40 @@ class UnknownOutcome(_Unanswered, TimeoutError):
     """
 
     verdict = "it may have been executed; look at the node before you send it again"
+
+
+class NotStarted(MotherError):
+    """Of several nodes that were to start together none has: ``node`` failed, ``cause`` says how.
+
+    ``still_held``: nodes that may be held at sync, since they did not acknowledge the S that was
+    sent to them then; they would start with the next ``y``.
+    """
+
+    def __init__(self, node: int, cause: MotherError, still_held: tuple[int, ...] = ()) -> None:
+        self.node = node
+        self.cause = cause
+        self.still_held = still_held
+        told = f"nothing was started: {cause}"
+        if still_held:
+            which = ", ".join(map(str, still_held))
+            told += f"; {which} may still be held at sync, send S before the next y"
+        super().__init__(told)
+
+
+class Stopped(MotherError):
+    """An emergency stop came while this waited for its turn: it has not been sent, and will not be.
+
+    ``node`` is 0 for a broadcast. Without a ``line``: what was waited for is not going to happen.
+    """
+
+    def __init__(self, node: int, line: str) -> None:
+        self.node = node
+        self.line = line
+        whom = f"node {node}" if node else "all nodes"
+        told = f"{whom}: {line!r} was not sent: an emergency stop came first; send it again"
+        if not line:
+            told = "an emergency stop came first: the motion is not over; begin again"
+        super().__init__(f"{told} once the machine may move")
 
 
 class LineLost(MotherError, ConnectionError):

@@ -22,7 +22,7 @@ from typing import Final
 from typing import Protocol as Contract
 
 from sacbus.kernel import MS, LineRate, Ns
-from sacbus.mother.caller import Clock
+from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, LineLost, MotherError
 from sacbus.wire.superstepper import (
     ANSWER_SIZE,

@@ -8,42 +8,32 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from sacbus.kernel import MS, SECOND, LineRate, Ns
+from sacbus.kernel import MS, LineRate, Ns
 from sacbus.language.line import quoted, short
 from sacbus.links import open_line
-from sacbus.mother.caller import SLACK, Acknowledged, Caller, Clock, Sent
-from sacbus.mother.errors import BadRequest, MotherError
+from sacbus.mother.caller import SLACK, Caller
+from sacbus.mother.clock import Clock
+from sacbus.mother.errors import BadRequest, MotherError, Stopped
+from sacbus.mother.loop import LoopClock
+from sacbus.mother.outcome import Acknowledged, Done, Outcome, Sent
+from sacbus.mother.scan import EVERY_ADDRESS, ScanProgress, scan
 from sacbus.mother.statistics import NodeStatistics
+from sacbus.wire.times import MOTHER_GAP
 
-__all__ = ["LINK_SLACK", "LoopClock", "Mother", "addressed_line"]
+if TYPE_CHECKING:
+    from sacbus.mother.group import Group, Member
+
+__all__ = ["LINK_SLACK", "Mother", "addressed_line"]
 
 #: How late an answer may be on a link out of this process: a USB adapter's 16 ms latency timer
 #: both ways, and a busy machine.
 LINK_SLACK: Final[Ns] = 100 * MS
 
 _ADDRESSED: Final = re.compile(r"0*([0-9]+)(.*)", re.DOTALL)
-
-
-class LoopClock:
-    """An event loop's clock for :class:`Caller`: ns since this object was made."""
-
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self._loop = loop
-        self._start = loop.time()
-
-    @property
-    def now(self) -> Ns:
-        """Ns since the start."""
-        # Rounded: a timer that fires at its very time must not find itself a nanosecond early.
-        return round((self._loop.time() - self._start) * SECOND)
-
-    def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> object:
-        """Call back then; gives the loop's timer handle."""
-        return self._loop.call_at(self._start + when / SECOND, callback, *arguments)
 
 
 class Mother:
@@ -61,27 +51,44 @@ class Mother:
         slack: Ns = SLACK,
         unsent: Callable[[], int] | None = None,
         arrive: Callable[..., None] | None = None,
+        gap: Ns = MOTHER_GAP,
+        set_dtr: Callable[..., bool] | None = None,
     ) -> None:
         """Have ``send`` put bytes on a line, with ``slack`` for answers beyond the line's figures.
 
         ``arrive(callback, *arguments)`` brings ``clock`` up to date before it calls back: a host's,
-        when mother sits on a bus in this process.
+        when mother sits on a bus in this process. ``gap`` as :class:`Caller` has it.
+        ``set_dtr(asserted=…)`` sets the DTR output of her adapter, and tells whether it has one.
         """
-        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent)
+        self._clock = clock
+        self._set_dtr = set_dtr
+        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent, gap=gap)
         self._arrive = arrive or _call
+        #: Those who wait for a time by mother's clock.
+        self._sleepers: set[asyncio.Future[None]] = set()
 
     @classmethod
     @asynccontextmanager
-    async def connect(cls, link: str, *, baud: int = 38_400) -> AsyncIterator[Mother]:
+    async def connect(
+        cls, link: str, *, baud: int = 38_400, gap: Ns = MOTHER_GAP
+    ) -> AsyncIterator[Mother]:
         """Mother on a line, for an ``async with`` block.
 
         ``link`` is the path of a serial port or pty, ``socket://host:port`` or
         ``rfc2217://host:port``. Raises :class:`~sacbus.links.LinkError` when it cannot be opened; a
         line lost later raises :class:`LineLost` in every call, and so does one after the block.
+        ``gap``: ns that are left free after every answer and broadcast; 0 loses packets on devices.
         """
         clock = LoopClock(asyncio.get_running_loop())
         async with open_line(link, baud) as line:
-            mother = cls(clock, line.send, rate=LineRate(baud), slack=LINK_SLACK)
+            mother = cls(
+                clock,
+                line.send,
+                rate=LineRate(baud),
+                slack=LINK_SLACK,
+                gap=gap,
+                set_dtr=line.set_dtr,
+            )
             line.start(mother.hear, mother.lose)
             try:
                 yield mother
@@ -105,36 +112,122 @@ class Mother:
     def lose(self, why: str) -> None:
         """The link's side: the line is gone."""
         self._caller.lose(why)
+        lost = self._caller.lost
+        for sleeper in self._sleepers:
+            if lost is not None and not sleeper.done():
+                sleeper.set_exception(lost)
+
+    @property
+    def now(self) -> Ns:
+        """The time by mother's clock, ns since some start: bus time, on a bus in this process."""
+        self._arrive(_nothing)
+        return self._clock.now
+
+    async def until(self, when: Ns) -> None:
+        """Wait until mother's clock shows ``when``, for motion that is planned to be over then.
+
+        :class:`LineLost` if the line goes before, :class:`Stopped` upon an emergency stop.
+        """
+        if self._caller.lost is not None:
+            raise self._caller.lost
+        sleeper: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._sleepers.add(sleeper)
+        self._arrive(self._clock.at, when, _wake, sleeper)
+        try:
+            await sleeper
+        finally:
+            self._sleepers.discard(sleeper)
 
     async def send(
         self, node: int, line: str | bytes, *, accept_duplicates: bool = False
     ) -> Acknowledged:
         """Send one command line to a node and wait for its ACK.
 
-        Raises :class:`Refused`, :class:`NoAnswer`, :class:`UnknownOutcome`, :class:`LineLost`, and
-        :class:`BadRequest` for what cannot be sent. ``accept_duplicates`` lets a command that is
-        not idempotent be sent again after silence; it may then run twice. A cancelled call whose
-        turn has not come is never sent; one that is out is not sent again.
+        Raises :class:`Refused`, :class:`NoAnswer`, :class:`UnknownOutcome`, :class:`Stopped`,
+        :class:`LineLost`, and :class:`BadRequest` for what cannot be sent. ``accept_duplicates``
+        lets a command that is not idempotent be sent again after silence; it may then run twice. A
+        cancelled call whose turn has not come is never sent; one that is out is not sent again.
         """
-        outcome = await self._outcome(
+        return await self._acknowledged(
             lambda done: self._caller.call(
                 node, _bytes(line), done, accept_duplicates=accept_duplicates
             )
         )
-        if not isinstance(outcome, Acknowledged):
-            raise TypeError(f"an addressed packet ended in {outcome!r}")
-        return outcome
 
     async def broadcast(self, line: str | bytes) -> None:
         """Send a line to all nodes; returns when the next packet may follow. Nobody answers."""
         await self._outcome(lambda done: self._caller.broadcast(_bytes(line), done))
 
-    async def _outcome(
-        self, ask: Callable[[Callable[[Acknowledged | Sent | MotherError], None]], None]
-    ) -> Acknowledged | Sent:
+    def set_dtr(self, *, asserted: bool) -> None:
+        """Set DTR, an output of a serial adapter that RS485 leaves to other uses, now.
+
+        It may drive the nodes' shared sync line: as adapters with TTL levels have it, asserted is
+        low. Every serial port asserts it when it is opened, so it has to be let go first. Many
+        boards reset at its edge if it is wired to them. :class:`BadRequest` where there is none.
+        """
+        if self._set_dtr is None or not self._set_dtr(asserted=asserted):
+            raise BadRequest(
+                "this line has no DTR to set, use a serial port that has one, or another release"
+            )
+
+    def pull_dtr(self) -> None:
+        """Assert DTR and let it go: an edge and back, for ``release`` of a group's start."""
+        self.set_dtr(asserted=True)
+        self.set_dtr(asserted=False)
+
+    def group(
+        self, axes: Mapping[str, int | Member] | None = None, /, **named: int | Member
+    ) -> Group:
+        """Axes that start together: ``mother.group(x=10, y=11)``, or a mapping of names to nodes.
+
+        A :class:`Member` in place of a node's address tells its settings. :class:`Group` itself
+        takes another queue position, or drift. :class:`BadRequest` for two axes on one node, and
+        what no node can be.
+        """
+        from sacbus.mother.group import Group  # noqa: PLC0415 (it stands on this file)
+
+        return Group(self, {**(axes or {}), **named})
+
+    async def estop(self) -> None:
+        """Emergency stop: S to all nodes, at once and twice more 1 ms apart. Nothing is waited for.
+
+        The first S is handed to the link before anything else happens; this returns when the third
+        is out, which it will be also when the caller is cancelled meanwhile. Calls that wait for
+        their turn raise :class:`Stopped` and are never sent; the one that is out ends as it does
+        (its ACK may collide with S), but is not sent again. Mother can be used afterwards as
+        before. Nobody answers a broadcast, so who has stopped is for the caller to find out.
+        :class:`LineLost` when there is no line.
+        """
+        for sleeper in self._sleepers:
+            if not sleeper.done():
+                sleeper.set_exception(Stopped(0, ""))
+        await self._outcome(self._caller.estop)
+
+    async def scan(
+        self,
+        addresses: Iterable[int] = EVERY_ADDRESS,
+        *,
+        progress: Callable[[ScanProgress], object] | None = None,
+    ) -> list[Acknowledged]:
+        """Ask every address whether a node is there; those that answer, in the order asked.
+
+        Each is asked with the empty line, which does nothing, three times before it is taken to be
+        absent: some 5 s for all 252 at 38 400 baud, less for those that answer. ``attempts`` counts
+        how often a node had to be asked, ``round_trip`` is that of its answer. ``progress`` is
+        called after each address. Other calls have their turns in between.
+        """
+        return await scan(self._caller, self._acknowledged, addresses, progress)
+
+    async def _acknowledged(self, ask: Callable[[Done], None]) -> Acknowledged:
+        outcome = await self._outcome(ask)
+        if not isinstance(outcome, Acknowledged):
+            raise TypeError(f"an addressed packet ended in {outcome!r}")
+        return outcome
+
+    async def _outcome(self, ask: Callable[[Done], None]) -> Acknowledged | Sent:
         future: asyncio.Future[Acknowledged | Sent] = asyncio.get_running_loop().create_future()
 
-        def done(outcome: Acknowledged | Sent | MotherError) -> None:
+        def done(outcome: Outcome) -> None:
             if future.done():
                 return  # the caller was cancelled while the packet was on its way
             if isinstance(outcome, MotherError):
@@ -171,6 +264,15 @@ def addressed_line(text: str) -> tuple[int, str]:
             f"node {short(found[1])}: expected an address from 4 to 255, or 0 for all nodes"
         )
     return node, found[2]
+
+
+def _nothing() -> None:
+    """What is done at a look at the clock."""
+
+
+def _wake(sleeper: asyncio.Future[None]) -> None:
+    if not sleeper.done():
+        sleeper.set_result(None)
 
 
 def _call(callback: Callable[..., object], *arguments: object) -> None:

@@ -17,7 +17,12 @@ KEPT: Final = 1_000
 
 @dataclass(slots=True)
 class NodeStatistics:
-    """Counts since the start, and the last round trips (ns, from the packet's first bit on)."""
+    """Counts since the start, and the last round trips (ns, from the packet's first bit on).
+
+    Once nothing is outstanding, ``sent`` is ``acks`` + ``naks`` + ``timeouts``, but for what was on
+    its way when the line was lost; of these, ``retries`` were asked before. Of broadcasts (address
+    0) ``sent`` alone says something.
+    """
 
     sent: int = 0
     acks: int = 0
@@ -37,4 +42,15 @@ class NodeStatistics:
             "min": ordered[0] / US,
             "median": median(ordered) / US,
             "p99": p99 / US,
+        }
+
+    def as_dict(self) -> dict[str, object]:
+        """The counts by name, and ``round_trip_us`` as :meth:`round_trip_us` has it."""
+        return {
+            "sent": self.sent,
+            "acks": self.acks,
+            "naks": self.naks,
+            "timeouts": self.timeouts,
+            "retries": self.retries,
+            "round_trip_us": self.round_trip_us(),
         }

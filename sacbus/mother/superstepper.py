@@ -14,7 +14,7 @@ from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
 from sacbus.links import open_line
-from sacbus.mother.caller import Clock
+from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, MotherError
 from sacbus.mother.exchanges import (
     SLACK,
@@ -25,7 +25,8 @@ from sacbus.mother.exchanges import (
     SuperStepperError,
     Talk,
 )
-from sacbus.mother.mother import LINK_SLACK, LoopClock
+from sacbus.mother.loop import LoopClock
+from sacbus.mother.mother import LINK_SLACK
 from sacbus.wire.superstepper import (
     Answer,
     ChangeSpeed,

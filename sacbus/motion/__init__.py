@@ -11,16 +11,20 @@ from sacbus.motion.limits import Caution, Limit
 from sacbus.motion.motor import Entry, Slip, lost, slips
 from sacbus.motion.planner import plan
 from sacbus.motion.profile import Profile
+from sacbus.motion.sequence import REST, Beginning, Left, begin, release
 from sacbus.motion.timebase import FACTORY_XFREQ, Timebase
 from sacbus.motion.transition import transition_warnings
 
 __all__ = [
     "FACTORY_XFREQ",
     "NO_RAMP",
+    "REST",
     "TICKS_PER_US",
+    "Beginning",
     "Caution",
     "Drive",
     "Entry",
+    "Left",
     "Limit",
     "Profile",
     "PullOut",
@@ -28,10 +32,12 @@ __all__ = [
     "Slip",
     "State",
     "Timebase",
+    "begin",
     "gap_passes",
     "load_ticks",
     "lost",
     "plan",
+    "release",
     "slips",
     "transition_warnings",
 ]

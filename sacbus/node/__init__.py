@@ -9,6 +9,7 @@ time. Nothing here knows a particular protocol or kind.
 from .contract import (
     BOOT,
     OFF,
+    STANDBY,
     Heard,
     MistunedNode,
     Node,
@@ -50,6 +51,7 @@ __all__ = [
     "GROUP",
     "MASTER",
     "OFF",
+    "STANDBY",
     "Decoder",
     "Heard",
     "KindError",

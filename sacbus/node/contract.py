@@ -17,6 +17,7 @@ from sacbus.movement import Movement
 __all__ = [
     "BOOT",
     "OFF",
+    "STANDBY",
     "Heard",
     "MistunedNode",
     "Node",
@@ -28,7 +29,9 @@ __all__ = [
     "Terminal",
 ]
 
-#: The states of a node that has power and does not obey yet, and of one that has none.
+#: The states of a node that does nothing, of one that has power and does not obey yet, and of one
+#: that has none.
+STANDBY: Final = "STANDBY"
 BOOT: Final = "BOOT"
 OFF: Final = "OFF"
 
@@ -242,6 +245,14 @@ class Node(Contract):
 
     def snapshot(self, now: Ns) -> Snapshot:
         """What can be seen of it at ``now``; changes nothing."""
+        ...
+
+    def stop(self, now: Ns) -> None:
+        """Stop its motor at once and drop all that waits, as its kind does in an emergency.
+
+        Nothing while it is off or boots, nor for what never moves. The owner asks the bus to touch
+        the node afterwards (``Bus.touch``).
+        """
         ...
 
     def power(self, *, on: bool, now: Ns) -> None:

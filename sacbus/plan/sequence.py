@@ -1,8 +1,8 @@
 """Commands in sequence: what each leaves to the next, and when each begins.
 
-Owns the walk through the entries (session defaults carried on, GAP between commands, loops) and
-the survey of it. All figures of a single command come from ``sacbus.motion``. Nothing is kept but
-what the next command needs, so a sequence may be of any length.
+Owns the walk through the entries (session defaults carried on, loops) and the survey of it. All
+figures of a command, and how it begins after another, come from ``sacbus.motion``. Nothing is kept
+but what the next command needs, so a sequence may be of any length.
 """
 
 from __future__ import annotations
@@ -27,16 +27,7 @@ from sacbus.language import (
     parse,
 )
 from sacbus.language.line import quoted
-from sacbus.motion import (
-    TICKS_PER_US,
-    Drive,
-    Profile,
-    Rpm,
-    gap_passes,
-    load_ticks,
-    plan,
-    transition_warnings,
-)
+from sacbus.motion import REST, Drive, Left, Profile, begin, plan, transition_warnings
 from sacbus.plan.entries import Commands, Entry, PlanError, Source
 
 __all__ = ["Plan", "Planned", "Survey", "plan_sequence"]
@@ -96,16 +87,10 @@ class Survey:
 
 @dataclass(frozen=True, slots=True)
 class _Standing:
-    """What a command leaves to the next one, but for the time.
-
-    ramps: acceleration, deceleration and kind of the last command, None before the first.
-    last_period: ticks of its last pulse, against which GAP is measured; 0 if nothing is kept.
-    """
+    """What an entry leaves to the next one, but for the time."""
 
     session: Session
-    kept_rpm: Rpm
-    ramps: tuple[int, int, bool] | None = None
-    last_period: int = 0
+    left: Left
 
 
 class Plan:
@@ -192,7 +177,9 @@ class Plan:
 
     def _run(self) -> _Run:
         session = Session.start(Defaults(sprf=self.drive.steps_per_rev))
-        return _Run(self.drive, _Standing(session, self._start_rpm), gap=self._gap)
+        return _Run(
+            self.drive, _Standing(session, replace(REST, kept_rpm=self._start_rpm)), gap=self._gap
+        )
 
 
 def plan_sequence(
@@ -258,24 +245,13 @@ class _Run:
                 "continuous: give that one steps"
             )
         before = self.standing
-        ramps = (motion.acc100, motion.dec100, motion.linear)
-        start = self.end + motion.wait_us * TICKS_PER_US
-        kept = before.kept_rpm
-        if before.ramps is not None:
-            load = load_ticks(acceleration_changes=ramps != before.ramps)
-            late = start - self.end + load
-            seamless = kept and (not self._gap or gap_passes(late, before.last_period))
-            kept = kept if seamless else 0
-            if not seamless or motion.wait_us:
-                start += load
-        profile = plan(motion, self._drive, kept)
+        beginning = begin(motion, before.left, self.end, gap=self._gap)
+        profile = plan(motion, self._drive, beginning.start_rpm)
         beginnings = () if self._last is None else transition_warnings(self._last, profile)
-        planned = Planned(entry.text, motion, profile, start, remarks, beginnings)
+        planned = Planned(entry.text, motion, profile, beginning.start, remarks, beginnings)
         self.end = planned.end
         self._last = profile
-        # Finding the last period lays the profile out; only a velocity that is kept needs it.
-        last_period = profile.last_period if profile.kept_rpm else 0
-        self.standing = _Standing(before.session, profile.kept_rpm, ramps, last_period)
+        self.standing = _Standing(before.session, Left.by(profile))
         return planned
 
 

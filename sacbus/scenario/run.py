@@ -19,7 +19,8 @@ from sacbus.host import Standstill, run_virtual
 from sacbus.hosted import HostedBus
 from sacbus.kernel import SECOND, Kernel, LineRate, Ns
 from sacbus.links import PtyLink, open_line
-from sacbus.mother.mother import LINK_SLACK, LoopClock
+from sacbus.mother.loop import LoopClock
+from sacbus.mother.mother import LINK_SLACK
 from sacbus.scenario.bench import Bench, far_bench, hosted_bench, piped_bench
 from sacbus.scenario.expectations import Straight, Together
 from sacbus.scenario.play import Play

@@ -185,6 +185,22 @@ def test_who_leaves_hears_no_more_but_what_it_had_said_is_sent_to_the_end() -> N
     assert desk.heard == []
 
 
+def test_what_is_dropped_is_never_sent_and_who_was_held_may_go_on() -> None:
+    bench = Bench()
+    asked: list[bool] = []
+    port = Port(bench.bus.medium, lambda _heard, _now: None, hold=asked.append)
+    for _ in range(10):
+        port.talk(b"U" * 4_000)
+    port.drop()
+    assert (port.unsent, asked) == (0, [True, False])
+    bench.run()
+    # What was being sent is sent to its end.
+    assert bench.bus.medium.counters().bytes == 4_000
+    port.talk(b"U")
+    bench.run()
+    assert bench.bus.medium.counters().bytes == 4_001
+
+
 NINE_BITS = LineRate(9_600, bits=11)
 
 

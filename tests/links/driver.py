@@ -23,6 +23,7 @@ TIOCSSERIAL: Final = 0x541F
 TIOCMBIS: Final = 0x5416
 TIOCMBIC: Final = 0x5417
 TIOCOUTQ: Final = 0x5411
+DTR: Final = 0x002
 RTS: Final = 0x004
 LOW_LATENCY: Final = 0x2000
 FRAME: Final = 6
@@ -40,6 +41,7 @@ class Driver:
         self.obeys = obeys
         self.rs485_flags = 0
         self.rts: list[int] = []
+        self.dtr: list[int] = []
         self.framing_errors = 0
         self.flags = 0
         self.unsent = 0
@@ -49,6 +51,8 @@ class Driver:
         if request in (TIOCMBIS, TIOCMBIC) and self.modem_lines:
             if struct.unpack("I", argument)[0] & RTS:
                 self.rts.append(int(request == TIOCMBIS))
+            if struct.unpack("I", argument)[0] & DTR:
+                self.dtr.append(int(request == TIOCMBIS))
             return argument
         if request in (TIOCGRS485, TIOCSRS485) and self.rs485:
             words = array("I", bytes(argument))

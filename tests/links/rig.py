@@ -40,6 +40,7 @@ __all__ = [
 Capability = Literal[
     "stands alone",  # there is a link while no program has the other end open
     "tells absence",  # it knows when nobody is there, and then keeps nothing for whoever comes
+    "tells leaving",  # it tells when a program has said its last word, while it lasts itself
     "counts unread",  # it knows what a program that left had not read, and counts it as dropped
     "has rate",  # a program can set its rate, and finds the bus's
     "serves many",  # each program gets a link of its own
@@ -243,23 +244,35 @@ def _pty_without_inotify() -> Rig:
 #: is about where not all can.
 BACKENDS: Final[dict[str, Backend]] = {
     "memory": backend(
-        _memory, "stands alone", "tells absence", "counts unread", "has rate", "hangs up"
+        _memory,
+        "stands alone",
+        "tells absence",
+        "tells leaving",
+        "counts unread",
+        "has rate",
+        "hangs up",
     ),
     "pty": backend(
         lambda: LinkRig(PtyLink()),
         "stands alone",
         "tells absence",
+        "tells leaving",
         "counts unread",
         "has rate",
         "hangs up",
     ),
     "pty without inotify": backend(_pty_without_inotify, "stands alone", "has rate", "hangs up"),
     "tcp": backend(
-        lambda: ServerRig(TcpServer(), TcpProgram), "tells absence", "serves many", "hangs up"
+        lambda: ServerRig(TcpServer(), TcpProgram),
+        "tells absence",
+        "tells leaving",
+        "serves many",
+        "hangs up",
     ),
     "rfc2217": backend(
         lambda: ServerRig(Rfc2217Server(), TelnetProgram),
         "tells absence",
+        "tells leaving",
         "has rate",
         "serves many",
         "hangs up",

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sacbus.links import LinkError
+from sacbus.links import LinkError, TellingLink
 from tests.links.rig import BACKENDS, Client, Ear, Rig, able_to, rig_of, until
 
 pytestmark = pytest.mark.asyncio
@@ -152,6 +152,33 @@ async def test_what_a_client_wrote_before_it_left_is_heard(rig: Rig) -> None:
     await say(client, b"last words")
     rig.forget(client)
     await until(lambda: rig.heard == b"last words")
+
+
+@able_to("tells leaving")
+async def test_that_a_client_has_left_is_told_once_all_that_it_said_is_heard(rig: Rig) -> None:
+    heard_then: list[bytes] = []
+    client = await rig.client_is_known()
+    link = rig.link
+    assert isinstance(link, TellingLink)
+    link.left = lambda: heard_then.append(bytes(rig.heard))
+    await say(client, b"last words")
+    await turn_the_loop()
+    assert heard_then == []
+    rig.forget(client)
+    await until(lambda: heard_then)
+    assert heard_then == [b"last words"]
+
+
+@able_to("tells leaving")
+async def test_a_link_that_is_closed_is_not_left_by_its_client(rig: Rig) -> None:
+    told: list[str] = []
+    await rig.client_is_known()
+    link = rig.link
+    assert isinstance(link, TellingLink)
+    link.left = lambda: told.append("left")
+    rig.shut()
+    await turn_the_loop()
+    assert told == []
 
 
 async def test_a_slow_reader_loses_the_rest_and_nothing_else(rig: Rig) -> None:

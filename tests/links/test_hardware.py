@@ -9,9 +9,11 @@ from collections.abc import Iterator
 import pytest
 import serial
 
+from sacbus import Mother
 from sacbus.links import LinkError, adapter
 from sacbus.links.adapter import AdapterLink
-from sacbus.links.hardware import FramingErrors, hasten, kernel_direction, set_rts
+from sacbus.links.hardware import FramingErrors, hasten, kernel_direction, set_dtr, set_rts
+from sacbus.mother import BadRequest
 from tests.links.driver import LOW_LATENCY, Driver, driven
 from tests.links.programs import PtyProgram
 from tests.links.rig import Ear, until
@@ -41,6 +43,7 @@ def test_a_pty_has_no_direction(port: serial.Serial) -> None:
     assert not kernel_direction(port, echo=False)
     assert port.rs485_mode is None
     assert not set_rts(port, high=True)
+    assert not set_dtr(port, asserted=True)
 
 
 def test_a_pty_counts_no_framing_errors(port: serial.Serial) -> None:
@@ -54,6 +57,18 @@ def test_a_driver_is_asked_to_hand_on_bytes_at_once(port: serial.Serial) -> None
     with driven(Driver()) as driver:
         assert hasten(port)
         assert driver.flags == LOW_LATENCY
+
+
+@pytest.mark.asyncio
+async def test_mother_pulls_dtr_of_the_port_that_she_is_on(wire: Wire) -> None:
+    with driven(Driver()) as driver:
+        async with Mother.connect(wire.near) as mother:
+            driver.dtr.clear()
+            mother.set_dtr(asserted=False)
+            mother.pull_dtr()
+            assert driver.dtr == [0, 1, 0]
+        with pytest.raises(BadRequest, match="this line has no DTR to set"):
+            mother.pull_dtr()  # of a port that is closed
 
 
 @pytest.mark.parametrize("echo", [False, True])

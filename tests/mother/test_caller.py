@@ -21,6 +21,7 @@ from sacbus.mother import (
     Sent,
     UnknownOutcome,
 )
+from sacbus.mother.caller import SoftOpHeard
 from sacbus.wire import encode
 from tests.mother.rig import Outcome, Rig, Weather, answer_lost, body_spoilt, packet_lost
 
@@ -314,6 +315,28 @@ def test_packets_of_others_are_counted_and_noise_is_too() -> None:
     assert rig.caller.strays == 0
 
 
+def test_soft_ops_are_told_to_who_listens() -> None:
+    rig = Rig(10)
+    heard: list[SoftOpHeard] = []
+    rig.ask(10, b"$O1")
+    rig.caller.soft_op_listeners.append(heard.append)
+    begin = rig.kernel.now
+    # A tenth of a second of wait, so that its ACK is long out when it starts.
+    rig.ask(10, b"m2v60a999d999t100000")
+    assert [(one.node, one.begins) for one in heard] == [(10, True), (10, False)]
+    assert heard[0].at > begin + 100 * MS
+    assert heard[1].at - heard[0].at == 10 * MS
+    # A message of another node's to everybody, and a soft op to one node alone, are none.
+    rig.interrupt(rig.kernel.now + MS, encode(0, 11, b" hello"))
+    rig.interrupt(rig.kernel.now + 20 * MS, encode(85, 11, b"\x11"))
+    rig.kernel.run()
+    assert len(heard) == 2
+    rig.caller.soft_op_listeners.clear()
+    rig.ask(10, b"m1")
+    assert len(heard) == 2
+    assert rig.caller.overheard == 6
+
+
 def test_mothers_own_bytes_echoed_by_the_adapter_are_nobody_elses() -> None:
     rig = Rig(10, echo=True)
     assert isinstance(rig.ask(10, b"m400"), Acknowledged)
@@ -452,3 +475,46 @@ def test_no_answer_is_late_while_the_packet_still_waits_for_the_line() -> None:
     (outcome,) = outcomes
     assert isinstance(outcome, Acknowledged)
     assert outcome.attempts == 1
+
+
+def test_without_a_gap_the_next_request_follows_the_answer_at_once() -> None:
+    kernel = Kernel()
+    bus = Bus(kernel, KIND.protocol)
+    bus.add(KIND.create(10, SacSettings(deaf_time=False), bus.rate, bus.tell))
+    outcomes: list[Outcome] = []
+    starts: list[int] = []
+    port = Port(bus.medium, lambda heard, _now: caller.hear(heard.data), latency=0)
+    caller = Caller(kernel, port.talk, gap=0)
+    bus.medium.watchers.append(lambda sent: starts.append(sent.start))
+    for _ in range(3):
+        caller.call(10, b"m400", outcomes.append)
+    kernel.run()
+    exchange = TEN_BYTES + TURNAROUND + FOUR_BYTES
+    assert starts[::2] == [0, exchange, 2 * exchange]
+    assert outcomes == [Acknowledged(10, 1, exchange)] * 3
+
+
+def test_without_a_gap_what_was_refused_is_asked_again_before_the_next() -> None:
+    rig = Rig(10)
+    rig.caller = Caller(rig.kernel, rig._send, gap=0)
+    rig.expect([body_spoilt, packet_lost])
+    first, second = rig.call(10, b"V100"), rig.call(10, b"V200")
+    rig.kernel.run()
+    assert isinstance(first[0], Acknowledged)
+    assert isinstance(second[0], Acknowledged)
+    # Spoilt and refused; sent into the time in which the node is deaf; heard; and the next one.
+    assert [packet[3:7] for packet in rig.sent[:3]] == [b"V100"] * 3
+
+
+@pytest.mark.parametrize("body", [b"m400", b"q30m4294967295vc4294967295a10.47d1l0u0"])
+def test_the_longest_call_is_one_that_fails_to_its_end(body: bytes) -> None:
+    rig = Rig(10)
+    rig.expect([packet_lost, packet_lost, packet_lost])
+    began = rig.kernel.now
+    outcomes = rig.call(10, body, accept_duplicates=True)
+    while not outcomes:
+        rig.kernel.run_next()
+    took = rig.kernel.now - began
+    assert isinstance(outcomes[0], NoAnswer)
+    # It has a pause before it, one after each answer, and a space for its CRC to spare.
+    assert took < rig.caller.longest_call(len(body)) < took + 8 * MS

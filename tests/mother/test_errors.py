@@ -8,6 +8,7 @@ from sacbus.mother import (
     MotherError,
     NoAnswer,
     Refused,
+    Stopped,
     UnknownOutcome,
 )
 
@@ -19,6 +20,7 @@ from sacbus.mother import (
         (Refused, Exception),
         (NoAnswer, TimeoutError),
         (UnknownOutcome, TimeoutError),
+        (Stopped, Exception),
         (LineLost, ConnectionError),
     ],
 )
@@ -50,3 +52,10 @@ def test_the_text_names_node_line_attempts_and_last_answer(
 
 def test_one_attempt_is_told_as_once() -> None:
     assert "sent once, " in str(Refused(85, "S", 1, "NAK"))
+
+
+def test_what_was_stopped_says_whom_it_was_for_and_that_it_was_not_sent() -> None:
+    fault = Stopped(85, "m400")
+    assert (fault.node, fault.line) == (85, "m400")
+    assert str(fault).startswith("node 85: 'm400' was not sent: an emergency stop came first")
+    assert str(Stopped(0, "y")).startswith("all nodes: 'y' was not sent")

@@ -147,6 +147,32 @@ def test_two_mothers_of_one_bus_take_no_answer_of_each_others() -> None:
     virtually(play)
 
 
+def test_mother_waits_by_the_clock_of_her_bus() -> None:
+    async def play(bus: HostedBus, mother: Mother) -> None:
+        await mother.until(3 * SECOND + 1)
+        assert mother.now == bus.now() == 3 * SECOND + 1
+        await mother.until(2 * SECOND)
+        assert mother.now == 3 * SECOND + 1
+
+    virtually(play)
+
+
+def test_who_waits_for_a_time_is_told_when_the_line_goes() -> None:
+    async def play(bus: HostedBus, mother: Mother) -> None:
+        waiting = asyncio.create_task(mother.until(3 * SECOND))
+        cancelled = asyncio.create_task(mother.until(3 * SECOND))
+        await asyncio.sleep(1)
+        cancelled.cancel()
+        mother.lose("unplugged")
+        with pytest.raises(LineLost, match="unplugged"):
+            await waiting
+        assert cancelled.cancelled()
+        with pytest.raises(LineLost, match="unplugged"):
+            await mother.until(4 * SECOND)
+
+    virtually(play)
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -288,6 +314,31 @@ def test_a_line_that_hangs_up_fails_what_waits_and_what_comes_later() -> None:
                 await mother.send(10, "m400")
 
         on_a_line(other, play)
+
+
+def test_a_line_without_dtr_says_so() -> None:
+    async def tcp() -> None:
+        server = await asyncio.start_server(lambda _reader, writer: writer.close(), "127.0.0.1", 0)
+        async with server:
+            port = server.sockets[0].getsockname()[1]
+            async with Mother.connect(f"socket://127.0.0.1:{port}") as mother:
+                with pytest.raises(BadRequest, match="this line has no DTR to set"):
+                    mother.pull_dtr()
+
+    asyncio.run(tcp())
+    with peer() as other:  # a pty has none either
+
+        async def play(mother: Mother) -> None:
+            with pytest.raises(BadRequest, match="this line has no DTR to set"):
+                mother.set_dtr(asserted=True)
+
+        on_a_line(other, play)
+
+    async def hosted(_bus: HostedBus, mother: Mother) -> None:
+        with pytest.raises(BadRequest, match="this line has no DTR to set"):
+            mother.pull_dtr()
+
+    virtually(hosted)
 
 
 def test_a_call_that_outlives_the_connection_is_told() -> None:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import json
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -38,3 +40,13 @@ def test_min_median_and_p99_never_cross(round_trips: list[int]) -> None:
     assert told["min"] <= told["median"] <= told["p99"] <= max(round_trips) / 1_000
     exceeding = sum(one / 1_000 > told["p99"] for one in round_trips)
     assert exceeding <= len(round_trips) / 100
+
+
+def test_all_of_it_is_a_dictionary_that_json_takes() -> None:
+    statistics = NodeStatistics(sent=5, acks=2, naks=1, timeouts=2, retries=3)
+    counts = {"sent": 5, "acks": 2, "naks": 1, "timeouts": 2, "retries": 3}
+    assert statistics.as_dict() == {**counts, "round_trip_us": None}
+    statistics.round_trips.extend([4_000_000, 5_000_000])
+    told = statistics.as_dict()
+    assert told["round_trip_us"] == {"min": 4000.0, "median": 4500.0, "p99": 5000.0}
+    assert json.loads(json.dumps(told)) == told

@@ -50,18 +50,16 @@ def test_a_plain_test_moves_its_bus(pytester: pytest.Pytester) -> None:
 def test_an_async_test_runs_in_the_time_of_its_bus(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """
-        import asyncio, pytest, time
+        import asyncio, pytest
 
         @pytest.mark.asyncio
         async def test_move(bus, mother):
-            begun = time.monotonic()
             await mother.send(10, "m400v120")
             await bus.expected(node=10, position=400, state="STANDBY", within="5 s")
             before = bus.now
             await asyncio.sleep(600)
             assert 0 <= bus.now - before - 600_000_000_000 <= 1  # a ns of float seconds
             assert asyncio.get_running_loop().time() == bus.time()
-            assert time.monotonic() - begun < 300
 
         @pytest.mark.asyncio
         @pytest.mark.parametrize("steps", [100, 200])

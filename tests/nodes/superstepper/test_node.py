@@ -208,6 +208,20 @@ def test_without_power_it_forgets_where_it_stands_and_is_silent() -> None:
     assert bench.exchange("1f 00 02") == "83 00 00 0a 8d"
 
 
+def test_in_an_emergency_no_step_follows() -> None:
+    bench = Bench(3)
+    bench.execute(MoveAtSpeed(True, 4_000, accelerate=False))
+    bench.run(SECOND)
+    bench.node.stop(bench.now)
+    bench.run(SECOND)
+    seen = bench.node.snapshot(bench.now)
+    assert (seen.state, seen.position_pulses) == ("STANDBY", 500)
+    assert bench.node.pins.level("enable", bench.now) == 1
+    bench.node.power(on=False, now=bench.now)
+    bench.node.stop(bench.now)
+    assert bench.node.state(bench.now) == "OFF"
+
+
 def test_pins_that_it_does_not_have_are_refused() -> None:
     pins = Bench(3).node.pins
     assert pins.inputs == ("home",)

@@ -1,0 +1,68 @@
+"""Options that say how a node is set: what its motion is planned by.
+
+The same words, defaults and limits wherever something is planned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+import click
+
+__all__ = ["drive_options", "tuning_options"]
+
+_F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command has
+
+_BYTE: Final = 255
+
+
+def drive_options(command: _F) -> _F:
+    """``--ustep``, ``--sprf``, ``--slow``: the parameters of that name."""
+    for option in (
+        click.option(
+            "--slow",
+            type=click.IntRange(1, _BYTE),
+            default=10,
+            show_default=True,
+            help="RPM up to which there are no ramps.",
+        ),
+        click.option(
+            "--sprf",
+            type=click.IntRange(1, 65_535),
+            default=200,
+            show_default=True,
+            help="Full steps per revolution.",
+        ),
+        click.option(
+            "--ustep",
+            type=click.IntRange(0, 7),
+            default=0,
+            show_default=True,
+            help="Microsteps, as a power of two.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def tuning_options(command: _F) -> _F:
+    """``--ihd``, ``--xclk``: what a node's time is tuned by."""
+    for option in (
+        click.option(
+            "--xclk",
+            type=click.IntRange(0, _BYTE),
+            default=0,
+            show_default=True,
+            help="Half microseconds added to every period.",
+        ),
+        click.option(
+            "--ihd",
+            type=click.IntRange(0, _BYTE),
+            default=8,
+            show_default=True,
+            help="Half microseconds taken from every period; 8 is exact.",
+        ),
+    ):
+        command = option(command)
+    return command
