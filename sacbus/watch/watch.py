@@ -90,7 +90,9 @@ class Watch:
         self._slack = slack
         self._lanes = [_Lane(Stream(protocol, rate, first + one)) for one in range(lanes)]
         patience = protocol.patience(rate.span(1))
-        self._packet_ends = PACKET_ENDS if patience is None else patience
+        # What a link brings may have waited on its way.
+        late = max(slack - FEED_SLACK, 0)
+        self._packet_ends = PACKET_ENDS if patience is None else patience + late
         #: Requests by who asked whom; of each pair only the last can be answered.
         self._open: dict[tuple[int, int], _Open] = {}
         #: Reports that wait for the transmission that they came of.
