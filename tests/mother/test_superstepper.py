@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import Coroutine
+from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
@@ -113,3 +115,17 @@ async def test_9_bit_mode_works_behind_rfc_2217() -> None:
             assert await master.read_word(3, 3) == 32_000
             assert await master.read(4, 2) == 10
         assert bus.snapshot(3).counters["ack"] == 2
+
+
+def test_the_eeprom_outlives_the_bus(tmp_path: Path) -> None:
+    async def session() -> int:
+        async with hosted(state=tmp_path) as bus:
+            master = SuperStepper.on(bus)
+            before = await master.read(3, 0x80, eeprom=True)
+            await master.write(3, 0x80, 0x42, eeprom=True)
+            return before
+
+    assert virtually(session()) == 0xFF
+    assert virtually(session()) == 0x42
+    stored = json.loads((tmp_path / "bus" / "3").read_text())
+    assert stored["kind"] == "ss-mst67"
