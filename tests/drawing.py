@@ -21,7 +21,12 @@ def without_matplotlib(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = [name for name in sys.modules if name.startswith("matplotlib.")]
     for name in ("matplotlib", *loaded):
         monkeypatch.setitem(sys.modules, name, None)
-    for name in ("sacbus.drawing", "sacbus.plan.picture", "sacbus.trace.plots"):
+    for name in (
+        "sacbus.drawing",
+        "sacbus.plan.picture",
+        "sacbus.simad.picture",
+        "sacbus.trace.plots",
+    ):
         package, _, last = name.rpartition(".")
         monkeypatch.delitem(sys.modules, name, raising=False)
         if package in sys.modules:

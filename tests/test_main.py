@@ -56,6 +56,7 @@ GIVEN = {
     "run": ["/nonexistent.toml"],
     "export": ["/nonexistent", "--csv", "/nonexistent.csv"],
     "diff": ["/nonexistent", "/nonexistent"],
+    "simad": ["encode", "/nonexistent", "--axes", "10"],
     "dissector": [],
     "ss": ["/nonexistent", "3", "status"],
 }

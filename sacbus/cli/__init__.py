@@ -30,6 +30,7 @@ from sacbus.cli.run import run_command
 from sacbus.cli.scan import scan_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
+from sacbus.cli.simad import simad_group
 from sacbus.cli.ss import ss_group
 from sacbus.cli.terminal import terminal_command
 
@@ -67,6 +68,7 @@ for command in (
     calibrate_command,
     export_command,
     diff_command,
+    simad_group,
     check_command,
     eeprom_group,
     kinds_command,

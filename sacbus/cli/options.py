@@ -19,6 +19,7 @@ __all__ = [
     "help_unless_asked",
     "read_addresses",
     "read_endpoints",
+    "read_parameters",
     "read_settings",
     "shortened",
     "verbose",
@@ -96,6 +97,18 @@ def _noted(read: Callable[[str], _T], text: str) -> _T:
         return read(text)
     except NotationError as fault:
         raise click.BadParameter(str(fault)) from fault
+
+
+def read_parameters(
+    _ctx: click.Context, _param: click.Parameter, given: Sequence[str]
+) -> dict[str, object]:
+    """``--set NAME=VALUE`` of a scenario's parameters."""
+    from sacbus.scenario.parameters import given as read
+
+    try:
+        return dict(map(read, given))
+    except ValueError as wrong:
+        raise click.BadParameter(str(wrong)) from wrong
 
 
 def read_settings(

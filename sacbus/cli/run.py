@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
 
 import click
 
-from sacbus.cli.options import verbose
+from sacbus.cli.options import read_parameters, verbose
 from sacbus.cli.recordings import (
     fresh_text,
     picture_form,
@@ -36,17 +36,6 @@ SLOW: Final = 1.0
 STANDARD: Final = "-"
 
 
-def _read_parameters(
-    _ctx: click.Context, _param: click.Parameter, given: Sequence[str]
-) -> dict[str, object]:
-    from sacbus.scenario.parameters import given as read
-
-    try:
-        return dict(map(read, given))
-    except ValueError as wrong:
-        raise click.BadParameter(str(wrong)) from wrong
-
-
 @click.command("run")
 @click.argument("files", nargs=-1, required=True, metavar="SCENARIO.toml...")
 @click.option(
@@ -54,7 +43,7 @@ def _read_parameters(
     "parameters",
     multiple=True,
     metavar="NAME=VALUE",
-    callback=_read_parameters,
+    callback=read_parameters,
     help="A parameter's value; [1,2] makes a case of each. Repeats.",
 )
 @click.option("--seed", type=int, help="In place of the scenarios' own seeds.")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-from sacbus.mother.caller import Caller, SoftOpHeard
+from sacbus.mother.caller import Caller
 from sacbus.mother.clock import Clock
 from sacbus.mother.errors import (
     BadRequest,
@@ -33,6 +33,7 @@ from sacbus.mother.queue_file import (
 from sacbus.mother.release import Release, Share, stand_down, start_together
 from sacbus.mother.request import safe_body
 from sacbus.mother.scan import ScanProgress
+from sacbus.mother.soft_ops import SoftOpHeard
 from sacbus.mother.statistics import NodeStatistics
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Final
 
 from sacbus.kernel import SECOND, US, Ns
 from sacbus.language import NO_RAMP, Defaults, Motion, Move, Session, ThrowAway
-from sacbus.mother.caller import SoftOpHeard
 from sacbus.mother.errors import BadRequest, MotherError, Stopped
+from sacbus.mother.soft_ops import SoftOpHeard
 from sacbus.motion import TICKS_PER_US, Drive, plan
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from sacbus.kernel import MS, LineRate, Ns
@@ -21,10 +20,9 @@ from sacbus.mother.estop import EmergencyStop
 from sacbus.mother.outcome import Acknowledged, Done, Sent
 from sacbus.mother.pending import Request
 from sacbus.mother.request import checked_address, safe_body
+from sacbus.mother.soft_ops import SoftOpHeard, soft_op
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
-    DC1,
-    DC2,
     GENERAL_CALL,
     MOTHER,
     Answer,
@@ -35,14 +33,11 @@ from sacbus.wire import (
 )
 from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
 
-__all__ = ["SLACK", "TRIES", "Caller", "SoftOpHeard"]
+__all__ = ["SLACK", "TRIES", "Caller"]
 
 #: How long an answer may be late beyond the line's own figures, on a line in this process, once
 #: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
-
-#: The bodies of soft ops.
-_SOFT_OPS: Final = (bytes((DC1,)), bytes((DC2,)))
 
 #: What makes a packet of a body: STX, two addresses, ETX, CRC, NUL.
 FRAME_BYTES: Final = 6
@@ -52,18 +47,6 @@ _PADDING: Final = 1
 
 #: Attempts for what may be repeated.
 TRIES: Final = 3
-
-
-@dataclass(frozen=True, slots=True)
-class SoftOpHeard:
-    """A node tells everybody that a command of its begins (DC1) or has ended (DC2).
-
-    at: when mother had the whole packet, ns by her clock; always as long after the event itself.
-    """
-
-    node: int
-    begins: bool
-    at: Ns
 
 
 class Caller:
@@ -234,8 +217,8 @@ class Caller:
                 self.faults += 1
             elif type(event) is Packet and event.src != MOTHER:
                 self.overheard += 1
-                if self.soft_op_listeners and event.dest == GENERAL_CALL:
-                    self._soft_op(event)
+                if self.soft_op_listeners:
+                    self._tell_soft_op(event)
 
     @property
     def lost(self) -> LineLost | None:
@@ -303,12 +286,11 @@ class Caller:
                 clock.at(self._due, self._look)
         self._send(request.data)
 
-    def _soft_op(self, packet: Packet) -> None:
-        if packet.body not in _SOFT_OPS:
-            return
-        heard = SoftOpHeard(packet.src, packet.body[0] == DC1, self._clock.now)
-        for listener in tuple(self.soft_op_listeners):
-            listener(heard)
+    def _tell_soft_op(self, packet: Packet) -> None:
+        heard = soft_op(packet, self._clock.now)
+        if heard is not None:
+            for listener in tuple(self.soft_op_listeners):
+                listener(heard)
 
     def _answered(self, answer: Answer) -> None:
         request = self._outstanding

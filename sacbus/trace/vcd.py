@@ -7,12 +7,14 @@ closing is told the time.
 
 Signals of a node: clk, those that its kind knows (of a SAC dir, ms1 to ms3, op_sa, op_sb), inputs
 as they are driven (of a SAC sync), and tx_en, which is high while its bytes are on the line.
+Whoever has more to show on the same clock gives it as a ``Signal`` each.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TextIO
 
@@ -27,9 +29,13 @@ from sacbus.trace.records import BusAt, Driven, Moved, NodeOf, Record, Sent
 from sacbus.trace.track import Track
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sacbus.movement import Times
 
-__all__ = ["write_vcd"]
+    Bytes = NDArray[np.uint8]
+
+__all__ = ["Signal", "write_vcd"]
 
 Wire = Variable[Any]  # pyvcd's: a level of 0 or 1 here
 
@@ -47,12 +53,30 @@ _CLK: Final = "clk"
 _TX_EN: Final = "tx_en"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """A wire that is no node's: its level at the beginning, and its changes in the order of time.
+
+    times: int64, ns of the recording's clock; levels: 0 or 1, as many.
+    """
+
+    scope: str
+    name: str
+    level: int
+    times: Times
+    levels: Times | Bytes
+
+
 def write_vcd(
-    recording: Recording, out: TextIO, nodes: Collection[tuple[int, int]] | None = None
+    recording: Recording,
+    out: TextIO,
+    nodes: Collection[tuple[int, int]] | None = None,
+    signals: Sequence[Signal] = (),
 ) -> int:
     """Write a recording as VCD, a tick a ns; how many changes of level were written.
 
-    ``nodes``: only those, by bus and address.
+    ``nodes``: only those, by bus and address. ``signals``: what is written besides; at one instant
+    they change in the order given, behind the nodes' own.
     """
     records = iter(recording)
     first = _of_the_first_instant(records)
@@ -66,15 +90,17 @@ def write_vcd(
         for node in bus.nodes
         if nodes is None or (node.bus, node.address) in nodes
     }
-    page = _Page(writer, list(wires.values()), since)
+    others = [_Other(one, writer) for one in signals]
+    page = _Page(writer, [*wires.values(), *others], since)
     delay = max((bus.rate.span(LONG) for bus in recording.buses), default=0)
     for record in chain(first, records):
         page.write_until(record.when - delay)
         wire = wires.get(_whose(record))
         if wire is not None:
             wire.take(record)
-    page.write_until(recording.end + 1, last=True)
-    writer.close(recording.end)
+    end = max([recording.end, *(int(one.times[-1]) for one in signals if one.times.size)])
+    page.write_until(end + 1, last=True)
+    writer.close(end)
     return page.changes
 
 
@@ -102,7 +128,7 @@ class _Edges(NamedTuple):
 
     times: Times
     wire: Wire
-    levels: Times
+    levels: Times | Bytes
 
 
 class _Wires:
@@ -179,6 +205,23 @@ class _Wires:
         yield _Edges(both, self.clk, number % 2 ^ 1)
 
 
+class _Other:
+    """A signal that is no node's, on its way into the file."""
+
+    def __init__(self, signal: Signal, writer: VCDWriter) -> None:
+        self._signal = signal
+        self._wire: Wire = writer.register_var(
+            _word(signal.scope), _word(signal.name), "wire", size=1, init=signal.level
+        )
+
+    def edges(self, since: Ns, until: Ns) -> Iterator[_Edges]:
+        """What changes in [since, until)."""
+        times = self._signal.times
+        low, high = np.searchsorted(times, (since, until))
+        if high > low:
+            yield _Edges(times[low:high], self._wire, self._signal.levels[low:high])
+
+
 def _moves(track: Track, since: Ns) -> bool:
     """Whether anything but rest is to be expected of it from an instant on."""
     last = track.segments[-1]
@@ -189,7 +232,7 @@ def _moves(track: Track, since: Ns) -> bool:
 class _Page:
     """What is written at a time, in order."""
 
-    def __init__(self, writer: VCDWriter, wires: list[_Wires], since: Ns) -> None:
+    def __init__(self, writer: VCDWriter, wires: Sequence[_Wires | _Other], since: Ns) -> None:
         self._writer = writer
         self._wires = wires
         self._until = since

@@ -21,7 +21,7 @@ from sacbus.mother import (
     Sent,
     UnknownOutcome,
 )
-from sacbus.mother.caller import SoftOpHeard
+from sacbus.mother.soft_ops import SoftOpHeard
 from sacbus.wire import encode
 from tests.mother.rig import Outcome, Rig, Weather, answer_lost, body_spoilt, packet_lost
 
@@ -477,6 +477,20 @@ def test_no_answer_is_late_while_the_packet_still_waits_for_the_line() -> None:
     assert outcome.attempts == 1
 
 
+@pytest.mark.parametrize("body", [b"m400", b"q30m4294967295vc4294967295a10.47d1l0u0"])
+def test_the_longest_call_is_one_that_fails_to_its_end(body: bytes) -> None:
+    rig = Rig(10)
+    rig.expect([packet_lost, packet_lost, packet_lost])
+    began = rig.kernel.now
+    outcomes = rig.call(10, body, accept_duplicates=True)
+    while not outcomes:
+        rig.kernel.run_next()
+    took = rig.kernel.now - began
+    assert isinstance(outcomes[0], NoAnswer)
+    # It has a pause before it, one after each answer, and a space for its CRC to spare.
+    assert took < rig.caller.longest_call(len(body)) < took + 8 * MS
+
+
 def test_without_a_gap_the_next_request_follows_the_answer_at_once() -> None:
     kernel = Kernel()
     bus = Bus(kernel, KIND.protocol)
@@ -504,17 +518,3 @@ def test_without_a_gap_what_was_refused_is_asked_again_before_the_next() -> None
     assert isinstance(second[0], Acknowledged)
     # Spoilt and refused; sent into the time in which the node is deaf; heard; and the next one.
     assert [packet[3:7] for packet in rig.sent[:3]] == [b"V100"] * 3
-
-
-@pytest.mark.parametrize("body", [b"m400", b"q30m4294967295vc4294967295a10.47d1l0u0"])
-def test_the_longest_call_is_one_that_fails_to_its_end(body: bytes) -> None:
-    rig = Rig(10)
-    rig.expect([packet_lost, packet_lost, packet_lost])
-    began = rig.kernel.now
-    outcomes = rig.call(10, body, accept_duplicates=True)
-    while not outcomes:
-        rig.kernel.run_next()
-    took = rig.kernel.now - began
-    assert isinstance(outcomes[0], NoAnswer)
-    # It has a pause before it, one after each answer, and a space for its CRC to spare.
-    assert took < rig.caller.longest_call(len(body)) < took + 8 * MS

@@ -17,7 +17,7 @@ from sacbus.mother import Mother
 from sacbus.trace import Recorder, Recording, read
 from sacbus.trace import vcd as vcd_file
 from sacbus.trace.records import Sent
-from sacbus.trace.vcd import write_vcd
+from sacbus.trace.vcd import Signal, write_vcd
 from tests.trace.rig import Dump, recorded, two_axes
 
 
@@ -142,6 +142,38 @@ def test_only_the_nodes_that_are_asked_for() -> None:
     out = StringIO()
     write_vcd(recorded(two_axes), out, nodes=[(0, 11)])
     assert {name.split(".")[1] for name in Dump(out.getvalue()).edges} == {"node_11"}
+
+
+def test_signals_that_are_no_nodes_are_written_among_theirs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recording = recorded(two_axes)
+    later = [*recording][-1].when + SECOND
+    times = np.array([5, 1_000_000_000, 1_000_000_000, later], dtype=np.int64)
+    signals = [
+        Signal("others", "one", 1, times[:3:2], np.array([0, 1], dtype=np.uint8)),
+        Signal("others", "a b", 0, times[1::2], np.array([1, 0], dtype=np.uint8)),
+        Signal("others", "none", 1, times[:0], times[:0]),
+    ]
+    out = StringIO()
+    written = write_vcd(recording, out, signals=signals)
+    dump = Dump(out.getvalue())
+    begin = next(iter(recording)).when
+    assert dump.edges["others.one"] == [(begin, "1"), (5, "0"), (1_000_000_000, "1")]
+    assert dump.edges["others.a_b"] == [(begin, "0"), (1_000_000_000, "1"), (later, "0")]
+    assert dump.edges["others.none"] == [(begin, "1")]
+    # It goes on until they are over; of the nodes it tells what it would without them.
+    assert dump.end == later
+    alone = dumped(recording)
+    assert {name: dump.edges[name] for name in alone.edges} == alone.edges
+    assert written == write_vcd(recording, StringIO()) + 4
+    # One after the other as they were given, where both change at one instant.
+    body = out.getvalue().partition("#1000000000\n")[2].splitlines()
+    assert [line[0] for line in body[:2]] == ["1", "1"]
+    monkeypatch.setattr(vcd_file, "LONGEST", 50 * MS)
+    paged = StringIO()
+    write_vcd(recording, paged, signals=signals)
+    assert paged.getvalue() == out.getvalue()
 
 
 def test_one_that_was_killed_at_once_is_empty_and_well_formed() -> None:

@@ -1,0 +1,67 @@
+"""How fast steps become lines, and lines steps: ten million steps of 4, 6 and 8 axes in one call.
+
+Axes move at random as machines do (``tests/simad/random_steps.py``), some going one way and some
+the other. The baseline is what any method must do at least: to put the edges' times in order with
+``numpy.sort``. Every result is decoded, and has to be exactly what was encoded.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from benchmarks.figure import Figure, alternate
+from sacbus.simad import Encoding, Steps, decode, encode
+from tests.simad.random_steps import random_steps
+
+STEPS = 10_000_000
+
+
+def check(steps: Steps, coded: Encoding, decoded: Steps, axes: int) -> None:
+    """Every step is there again, the way it went, when it was told to fall, and late as told."""
+    assert decoded.count == steps.count
+    for axis in range(axes):
+        mine = steps.axes == axis
+        times, ways = decoded.of_axis(axis)
+        assert np.array_equal(ways, steps.directions[mine])
+        assert np.array_equal(times, coded.falls[mine])
+        told = coded.report.axes[axis]
+        late = times - steps.times[mine]
+        assert late.min() >= 0
+        assert (told.delay_max, told.moved) == (int(late.max()), int(np.count_nonzero(late)))
+
+
+def figures(rounds: int) -> list[Figure]:
+    """Steps per second, both ways."""
+    found = []
+    for axes in (4, 6, 8):
+        steps = random_steps(axes, axes, STEPS)
+        coded = encode(steps, axes)
+        check(steps, coded, decode(coded.edges), axes)
+        told = coded.report
+        edges = np.concatenate((coded.falls, coded.falls + 500))
+        few = min(rounds, 3)
+        took, least = alternate(partial(encode, steps, axes), partial(np.sort, edges), few)
+        found.append(
+            Figure(
+                f"SiMAD, {axes} axes on {told.lines} lines for {told.lines_without}, encoded",
+                STEPS / took / 1e6,
+                "M steps/s",
+                least / took,
+                "numpy.sort of the edges",
+                5.0,
+                "value, at least",
+            )
+        )
+        took, least = alternate(partial(decode, coded.edges), partial(np.sort, edges), few)
+        found.append(
+            Figure(
+                "the same decoded",
+                STEPS / took / 1e6,
+                "M steps/s",
+                least / took,
+                "numpy.sort of the edges",
+            )
+        )
+    return found

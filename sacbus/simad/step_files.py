@@ -1,0 +1,182 @@
+"""Steps in files: CSV for everybody, npy for numpy.
+
+Owns both forms. CSV has a line a step, ``time_ns,axis,direction``, with that as a first line or
+without; the axis is its number, the direction 1 or -1. npy has one array with fields of these
+names, or of whole numbers in three columns. In the order of time. An axis's number in a file is its
+name, not its place: nodes have addresses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, Final, NamedTuple, TextIO
+
+import numpy as np
+
+from sacbus.simad.fault import SimadError
+from sacbus.simad.steps import MOST_AXES, Steps
+
+if TYPE_CHECKING:
+    from sacbus.simad.steps import Times
+
+__all__ = ["FORMS", "axes_in", "read_steps", "write_csv", "write_npy"]
+
+FIELDS: Final = ("time_ns", "axis", "direction")
+FORMS: Final = (".csv", ".npy")
+
+#: Steps that are read or written at a time.
+PIECE: Final = 1 << 17
+
+_STORED: Final = np.dtype([("time_ns", "<i8"), ("axis", "<i4"), ("direction", "i1")])
+
+
+class _Columns(NamedTuple):
+    """Some lines of a file: three arrays of int64, and the number of the first, a line or a row."""
+
+    times: Times
+    axes: Times
+    directions: Times
+    first: int
+
+
+def axes_in(path: Path) -> tuple[int, ...]:
+    """The numbers of the axes that a file has steps of, sorted; goes through all of it."""
+    found: set[int] = set()
+    for columns in _columns(path):
+        found.update(np.unique(columns.axes).tolist())
+        if len(found) > MOST_AXES:
+            raise SimadError(f"{path}: expected {MOST_AXES} axes at most, got more, name some")
+    return tuple(sorted(found))
+
+
+def read_steps(path: Path, axes: Sequence[int]) -> Iterator[Steps]:
+    """The steps of these axes, an axis being its place among them; others are left out.
+
+    SimadError, naming the line, for what is none; OSError for what cannot be read.
+    """
+    numbers = np.array(axes, dtype=np.int64)
+    order = np.argsort(numbers)
+    now = 0
+    for columns in _columns(path):
+        _check(path, columns, now)
+        now = int(columns.times[-1])
+        place = np.searchsorted(numbers[order], columns.axes).clip(max=len(axes) - 1)
+        which = order[place]
+        mine = numbers[which] == columns.axes
+        if mine.any():
+            yield Steps(
+                columns.times[mine],
+                which[mine].astype(np.uint8),
+                columns.directions[mine].astype(np.int8),
+            )
+
+
+def write_csv(parts: Iterable[Steps], out: TextIO, names: Sequence[str]) -> int:
+    """Write steps, as they come; how many. ``names``: of the axes."""
+    out.write(",".join(FIELDS) + "\n")
+    written = 0
+    for part in parts:
+        columns = part.times.tolist(), part.axes.tolist(), part.directions.tolist()
+        out.write(
+            "".join(
+                [f"{when},{names[axis]},{way}\n" for when, axis, way in zip(*columns, strict=True)]
+            )
+        )
+        written += part.count
+    return written
+
+
+def write_npy(steps: Steps, out: BinaryIO, numbers: Sequence[int]) -> int:
+    """Write steps as one array; how many. ``numbers``: of the axes."""
+    stored = np.empty(steps.count, dtype=_STORED)
+    stored["time_ns"] = steps.times
+    stored["axis"] = np.array(numbers, dtype=np.int32)[steps.axes]
+    stored["direction"] = steps.directions
+    np.save(out, stored, allow_pickle=False)
+    return steps.count
+
+
+def _columns(path: Path) -> Iterator[_Columns]:
+    if path.suffix.lower() == ".npy":
+        yield from _of_array(path)
+    else:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            yield from _of_lines(path, file)
+
+
+def _of_array(path: Path) -> Iterator[_Columns]:
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except ValueError as fault:
+        raise SimadError(f"{path}: expected an array of numpy's, {fault}") from fault
+    names = array.dtype.names
+    if array.ndim == 1 and names is not None and set(FIELDS) <= set(names):
+        parts = [array[name] for name in FIELDS]
+    elif array.ndim == 2 and array.shape[1] == len(FIELDS):
+        parts = list(array.T)
+    else:
+        raise SimadError(
+            f"{path}: expected fields {', '.join(FIELDS)} or three columns, "
+            f"got {array.dtype} of shape {array.shape}"
+        )
+    if any(part.dtype.kind not in "iu" for part in parts):
+        raise SimadError(f"{path}: expected whole numbers, got {array.dtype}")
+    for first in range(0, len(array), PIECE):
+        times, axes, ways = (part[first : first + PIECE].astype(np.int64) for part in parts)
+        yield _Columns(times, axes, ways, first)
+
+
+def _of_lines(path: Path, file: TextIO) -> Iterator[_Columns]:
+    number = 1
+    while lines := list(islice(file, PIECE)):
+        skipped = int(number == 1 and lines[0].strip().split(",")[0].strip() == FIELDS[0])
+        rows = lines[skipped:]
+        try:
+            found = np.array([row.split(",") for row in rows]).astype(np.int64)
+        except (ValueError, OverflowError):
+            found = np.empty((0, 0), dtype=np.int64)
+        if rows and found.shape != (len(rows), len(FIELDS)):
+            found = _one_by_one(path, rows, number + skipped)
+        if len(found):
+            times, axes, ways = found.T
+            yield _Columns(times, axes, ways, number + skipped)
+        number += len(lines)
+
+
+def _one_by_one(path: Path, rows: Sequence[str], number: int) -> Times:
+    """Lines of which one at least is wrong; SimadError names the first."""
+    found = []
+    for line, row in enumerate(rows, start=number):
+        try:
+            values = [int(word) for word in row.split(",")]
+        except ValueError:
+            values = []
+        if len(values) != len(FIELDS) or any(abs(value) >= 1 << 63 for value in values):
+            raise SimadError(
+                f"{path}, line {line}: expected {','.join(FIELDS)} as whole numbers, "
+                f"got {row.strip()[:40]!r}"
+            )
+        found.append(values)
+    return np.array(found, dtype=np.int64)
+
+
+def _check(path: Path, columns: _Columns, now: int) -> None:
+    """SimadError for steps out of order, and for directions that are none."""
+    what = "row" if path.suffix.lower() == ".npy" else "line"
+    before = np.append(now, columns.times[:-1])
+    early = np.flatnonzero(columns.times < before)
+    if early.size:
+        place = int(early[0])
+        raise SimadError(
+            f"{path}, {what} {columns.first + place}: expected a time of {before[place]} ns or "
+            f"later, got {columns.times[place]}, sort the steps"
+        )
+    wrong = np.flatnonzero(np.abs(columns.directions) != 1)
+    if wrong.size:
+        place = int(wrong[0])
+        raise SimadError(
+            f"{path}, {what} {columns.first + place}: expected a direction of 1 or -1, "
+            f"got {columns.directions[place]}"
+        )
