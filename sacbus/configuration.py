@@ -13,7 +13,14 @@ from typing import Final
 
 from sacbus.bus import PLAIN_BITS
 from sacbus.links.places import AdapterAt, Place
-from sacbus.node import NodeKind, Protocol, SettingError, find_kind, settings_from
+from sacbus.node import (
+    NodeKind,
+    Protocol,
+    SettingError,
+    find_kind,
+    settings_from,
+    spoken_by,
+)
 
 __all__ = ["FASTEST", "SLOWEST", "Configuration", "NodeAt", "check"]
 
@@ -78,27 +85,31 @@ def check(configuration: Configuration) -> Protocol:
         raise SettingError(f"baud: expected 300 to 4000000, got {configuration.baud}")
     if configuration.lanes not in (None, 1, 2):
         raise SettingError(f"lanes: expected 1 or 2, got {configuration.lanes}")
-    protocol = find_kind(configuration.kind).protocol
+    default = find_kind(configuration.kind)
+    protocol = spoken_by(default, settings_from(default.settings, configuration.settings))
     seen: set[int] = set()
     nodes = configuration.every_node
     # Found once each: all that is installed is looked through for one.
     kinds: dict[str, NodeKind] = {}
     for number, node in enumerate(nodes):
-        if not 4 <= node.address <= 255:
-            raise SettingError(f"nodes: expected addresses from 4 to 255, got {node.address!r}")
         if node.address in seen:
             raise SettingError(f"nodes: expected every address once, got {node.address} twice")
         seen.add(node.address)
         kind = kinds.get(node.kind)
         if kind is None:
             kind = kinds[node.kind] = find_kind(node.kind)
-        settings_from(kind.settings, node.settings)
+        spoken = spoken_by(kind, settings_from(kind.settings, node.settings))
+        if node.address not in spoken.addresses:
+            low, high = spoken.addresses[0], spoken.addresses[-1]
+            raise SettingError(
+                f"nodes: expected addresses from {low} to {high}, got {node.address!r}"
+            )
         if number == 0:
-            protocol = kind.protocol
-        elif kind.protocol.name != protocol.name:
+            protocol = spoken
+        elif spoken.name != protocol.name:
             raise SettingError(
                 f"nodes: expected one protocol on a line, got {protocol.name} (node "
-                f"{nodes[0].address}) and {kind.protocol.name} (node {node.address})"
+                f"{nodes[0].address}) and {spoken.name} (node {node.address})"
             )
     if any(isinstance(place, AdapterAt) for place in configuration.links):
         if configuration.speed != 1:

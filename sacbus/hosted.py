@@ -254,14 +254,27 @@ class HostedBus:
         self._ports.append(port)
         return port
 
+    def port(self, hear: Callable[[bytes], None]) -> Port:
+        """A place on this very line for a master of one's own, at no distance from it.
+
+        ``hear`` is given what the nodes say; ``Port.talk`` and ``Port.unsent`` are what a master
+        needs. It is closed with the bus.
+        """
+
+        def heard(one: Heard, _now: Ns) -> None:
+            hear(one.data)
+
+        port = Port(self.bus.medium, heard, latency=0, name="mother")
+        self._ports.append(port)
+        return port
+
     def mother(self) -> Mother:
         """Mother on this very bus, at no distance from the line."""
 
-        def hear(heard: Heard, _now: int) -> None:
-            mother.hear(heard.data)
+        def hear(data: bytes) -> None:
+            mother.hear(data)
 
-        port = Port(self.bus.medium, hear, latency=0, name="mother")
-        self._ports.append(port)
+        port = self.port(hear)
         mother = Mother(
             self.host.kernel,
             port.talk,

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from sacbus.node import kinds
+
 ROOT = Path(__file__).parents[1]
 ROOMS = ("bus", "kernel", "language", "motion", "node", "wire")
 OUTSIDE = {"asyncio", "datetime", "logging", "select", "selectors", "socket", "threading", "time"}
@@ -49,3 +51,23 @@ def test_a_core_file_imports_no_loop_no_clock_and_no_logging(file: Path) -> None
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             named.add(node.module.partition(".")[0])
     assert not named & OUTSIDE
+
+
+#: What hosts, records, plays and watches nodes of any kind.
+KNOWS_NO_KIND = ("bus", "feed", "kernel", "movement", "node", "scenario", "trace", "watch")
+
+
+def test_no_kind_and_no_protocol_is_known_by_name_where_all_are_alike() -> None:
+    names = {one for kind in kinds().values() for one in (kind.name, kind.protocol.name)}
+    assert {"sac", "ss-mst67", "superstepper"} <= names
+    told = []
+    for room in KNOWS_NO_KIND:
+        place = ROOT / "sacbus" / room
+        for file in place.rglob("*.py") if place.is_dir() else [place.with_suffix(".py")]:
+            tree = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+            told += [
+                f"{file.name}: {node.value!r}"
+                for node in tree
+                if isinstance(node, ast.Constant) and node.value in names
+            ]
+    assert told == []

@@ -58,6 +58,7 @@ GIVEN = {
     "diff": ["/nonexistent", "/nonexistent"],
     "simad": ["encode", "/nonexistent", "--axes", "10"],
     "dissector": [],
+    "ss": ["/nonexistent", "3", "status"],
 }
 
 

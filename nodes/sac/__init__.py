@@ -23,6 +23,8 @@ class SacKind:
     summary = "SAC single-axis stepper controller"
     protocol = SAC_PROTOCOL
     settings = SacSettings
+    #: Sync is released by a low level.
+    drawn: Final[Mapping[str, int]] = {"sync": 1}
 
     def create(
         self,

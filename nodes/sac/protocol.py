@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
-from sacbus.kernel import LineRate
+from sacbus.kernel import LineRate, Ns
 from sacbus.language import describe, parse
 from sacbus.node import EVERYONE, Said
 from sacbus.wire import (
@@ -59,6 +60,14 @@ class SacProtocol:
     name = "sac"
     lanes = 1
     rate = LineRate()
+    #: 0 is everybody, 1 mother, 2 and 3 are STX and ETX (manual).
+    addresses = range(4, 256)
+    link_type = 147
+    dissector = Path(__file__).with_name("sac.lua")
+
+    def patience(self, _byte: Ns) -> Ns | None:
+        """A SAC has no time-outs: 2 s between two bytes were observed to be accepted."""
+        return None
 
     def cuts(self, data: bytes) -> Sequence[int]:
         """The ends of all trigger bytes, and of the bytes behind them, but the end of the data.
@@ -91,7 +100,7 @@ class SacProtocol:
         found = {hit[0] for hit in _ADDRESSED.findall(data)}
         return EVERYONE if GENERAL_CALL in found else sorted(found)
 
-    def decoder(self) -> PacketReceiver:
+    def decoder(self, _lane: int = 0) -> PacketReceiver:
         """The robust receiver."""
         return PacketReceiver()
 
@@ -117,8 +126,10 @@ class SacProtocol:
 
 
 def _packet(dest: int, src: int, body: bytes, verdict: str, size: int) -> Said:
-    answered = None if dest == GENERAL_CALL else turnaround(len(body), nul_follows=True)
-    return Said("packet", src, dest, body, describe(parse(body)), verdict, size, answered)
+    general = dest == GENERAL_CALL
+    answered = None if general else turnaround(len(body), nul_follows=True)
+    words = describe(parse(body))
+    return Said("packet", src, dest, body, words, verdict, size, answered, general)
 
 
 def _cuts_going_on(data: bytes) -> list[int]:

@@ -10,9 +10,10 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
+from sacbus.bus.hearing import WrongBaud
 from sacbus.bus.medium import Medium
 from sacbus.kernel import Appointment, Kernel, LineRate, Ns
-from sacbus.node import Heard, Node, Protocol, Report
+from sacbus.node import Heard, MistunedNode, Node, Protocol, Report
 
 __all__ = ["Bus", "NoSuchNode"]
 
@@ -107,6 +108,8 @@ class Bus:
     def add(self, node: Node) -> None:
         """Put a node on the line. Two of one address both hear and both answer, as on wires."""
         self._routes.add(node)
+        if isinstance(node, MistunedNode) and node.uart_baud is not None:
+            self.medium.add_fault(WrongBaud(node.address, node.uart_baud))
 
     @property
     def nodes(self) -> Iterator[Node]:

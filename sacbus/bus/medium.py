@@ -244,6 +244,8 @@ class Medium:
             heard = Heard(arrived, sent.start, first, self.rate, data[upto:])
             if sent.ninth is not None:
                 heard.ninth = sent.ninth_bits(first, upto, self.seed)
+            if sent.hits is not None:
+                heard.framing = sent.framing_errors(first, upto, self.seed)
             self._router.deliver(heard, sent.sender, now)
         # Listeners hear whole frames: up to a cut that is not followed by another a byte later, and
         # at the end. (What follows the last cut of a packet is its NUL; to hear that apart would
@@ -389,6 +391,7 @@ class Medium:
             piece.rate,
             piece.data[upto:],
             piece.ninth_bits(first, upto, self.seed),
+            piece.framing_errors(first, upto, self.seed),
         )
 
     def _end(self, sent: Transmission) -> None:

@@ -23,8 +23,9 @@ class Passage:
     """One transmission under faults. They change it in the order in which they were put on.
 
     ``values`` are the bytes that arrive, ``begins`` when each of them does (ns), ``ninth`` their
-    ninth bits where there are some. A *barrier* is asked whether it keeps the node of an address,
-    or EVERY_LINK, from hearing.
+    ninth bits where there are some, ``framing`` a 1 for each that has no stop bit, where any may
+    lack it. A *barrier* is asked whether it keeps the node of an address, or EVERY_LINK, from
+    hearing.
     """
 
     __slots__ = (
@@ -35,6 +36,7 @@ class Passage:
         "by",
         "echoes",
         "end",
+        "framing",
         "late",
         "left",
         "missed",
@@ -53,6 +55,7 @@ class Passage:
         self._node: int | None = None
         self.values = bytearray(sent.data)
         self.ninth = None if sent.ninth is None else bytearray(sent.ninth)
+        self.framing: bytearray | None = None
         #: Times of the bytes, once they are not those of the transmission any more.
         self._begins: list[Ns] | None = None
         #: When the line is free of it, if that is not when the sender should have ended.
@@ -103,8 +106,9 @@ class Passage:
         """The byte does not arrive; the others keep their times."""
         del self.begins[index]
         del self.values[index]
-        if self.ninth is not None:
-            del self.ninth[index]
+        for bits in (self.ninth, self.framing):
+            if bits is not None:
+                del bits[index]
 
     def double(self, index: int) -> None:
         """The byte arrives twice; those behind it come a byte later."""
@@ -112,8 +116,9 @@ class Passage:
         begins = self.begins
         begins.insert(index + 1, begins[index])
         self.values.insert(index + 1, self.values[index])
-        if self.ninth is not None:
-            self.ninth.insert(index + 1, self.ninth[index])
+        for bits in (self.ninth, self.framing):
+            if bits is not None:
+                bits.insert(index + 1, bits[index])
         self.put_off(index + 1, byte)
 
     def put_off(self, index: int, late: Ns) -> None:
@@ -126,6 +131,7 @@ class Passage:
         """Other bytes come instead, from the same instant on, without a pause."""
         sent = self.sent
         self.values = bytearray(data)
+        self.framing = None
         self._begins = [sent.start + sent.rate.span(index) for index in range(len(data))]
         if self.ninth is not None:
             self.ninth = bytearray(self.ninth[:1] * len(data))
@@ -148,10 +154,11 @@ class Passage:
 
     def _read(self, of: LineRate, at: LineRate, begins: Sequence[Ns]) -> None:
         found = resampled(self.values, self.ninth, begins, of, at)
-        self._begins = [begin for begin, _, _ in found]
-        self.values = bytearray(value for _, value, _ in found)
+        self._begins = [begin for begin, *_ in found]
+        self.values = bytearray(value for _, value, _, _ in found)
+        self.framing = bytearray(framing for *_, framing in found)
         if self.ninth is not None:
-            self.ninth = bytearray(ninth for _, _, ninth in found)
+            self.ninth = bytearray(ninth for _, _, ninth, _ in found)
 
     def reaches(self, listener: int | None) -> bool:
         """Whether the node of an address, or EVERY_LINK, hears it; notes it if not."""
@@ -216,7 +223,7 @@ class Passage:
 
     def _piece(self, rate: LineRate, first: int, last: int, start: Ns) -> Transmission:
         sent = self.sent
-        return Transmission(
+        piece = Transmission(
             sent.number,
             sent.sender,
             sent.lane,
@@ -227,3 +234,6 @@ class Passage:
             (),
             None if self.ninth is None else bytes(self.ninth[first:last]),
         )
+        if self.framing is not None:
+            piece.framing = bytes(self.framing[first:last])
+        return piece

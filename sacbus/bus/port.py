@@ -95,13 +95,16 @@ class Port:
         """The medium's side: pass on what arrived."""
         self._hear(heard, now)
 
-    def talk(self, data: bytes, ninth: int = 0) -> None:
-        """Bytes from outside, arriving now; ``ninth`` goes with each on a line of ninth bits."""
+    def talk(self, data: bytes, ninth: int | bytes = 0) -> None:
+        """Bytes from outside, arriving now, on a line of ninth bits each with its own.
+
+        ``ninth``: one for all, or a 0 or 1 for each.
+        """
         if not data:
             return
         self._buffer += data
         if self._ninth is not None:
-            self._ninth += bytes((ninth,)) * len(data)
+            self._ninth += ninth if isinstance(ninth, bytes) else bytes((ninth,)) * len(data)
         if len(self._buffer) > FULL:
             self._flow(held=True)
         if self._waiting:

@@ -33,6 +33,7 @@ class Transmission:
         "cuts",
         "data",
         "end",
+        "framing",
         "hits",
         "lane",
         "ninth",
@@ -67,6 +68,8 @@ class Transmission:
         self.end = end
         self.cuts = cuts
         self.ninth = ninth
+        #: A 1 for each byte that was sent without a stop bit; None where none was.
+        self.framing: bytes | None = None
         self.step = 0
         self.to_nodes = 0
         self.to_listeners = 0
@@ -139,6 +142,18 @@ class Transmission:
         for index in self._struck(self.hits, first, last):
             bits[index - first] ^= crc32(b"%d %d %d" % (seed, self.number, index)) >> 16 & 1
         return bytes(bits)
+
+    def framing_errors(self, first: int, last: int, seed: int) -> bytes | None:
+        """A 1 for each of bytes ``first`` to ``last`` (exclusive) that has no stop bit.
+
+        None where all have theirs. Of overlapped bytes half have none.
+        """
+        if self.hits is None:
+            return self.framing and self.framing[first:last]
+        found = bytearray(last - first if self.framing is None else self.framing[first:last])
+        for index in self._struck(self.hits, first, last):
+            found[index - first] |= crc32(b"%d %d %d" % (seed, self.number, index)) >> 17 & 1
+        return bytes(found)
 
     def _struck(self, hits: list[tuple[Ns, Ns]], first: int, last: int) -> set[int]:
         """Indices in ``first``..``last`` of the bytes that a hit touches, however briefly."""

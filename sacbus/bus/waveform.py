@@ -24,15 +24,15 @@ def resampled(
     begins: Sequence[Ns],
     of: LineRate,
     at: LineRate,
-) -> list[tuple[Ns, int, int]]:
+) -> list[tuple[Ns, int, int, int]]:
     """Bytes sent at the rate ``of`` as read at ``at``: when each begins (ns), and its bits.
 
-    The line rests high between them. A byte whose stop bit is low is taken as it is; the receiver
-    then waits for the line to rise before it looks for the next start bit.
+    The last is 1 where the stop bit is low: such a byte is taken as it is; the receiver then waits
+    for the line to rise before it looks for the next start bit. The line rests high between them.
     """
     edges, levels = _edges(values, ninth, begins, of)
     places = range(1, of.bits)
-    found: list[tuple[Ns, int, int]] = []
+    found: list[tuple[Ns, int, int, int]] = []
     after = begins[0] if begins else 0
     index = 0
     while True:
@@ -47,8 +47,9 @@ def resampled(
             for place in places
         ]
         value = sum(bit << place for place, bit in enumerate(bits[:8]))
-        found.append((start, value, bits[8] if of.bits == _NINE else 0))
         after = start + (2 * of.bits - 1) * SECOND // (2 * at.baud)
+        lacks_stop = 1 - _level(edges, levels, after)
+        found.append((start, value, bits[8] if of.bits == _NINE else 0, lacks_stop))
         index += 1
 
 

@@ -31,6 +31,7 @@ from sacbus.cli.scan import scan_command
 from sacbus.cli.send import send_command
 from sacbus.cli.serve import serve_command
 from sacbus.cli.simad import simad_group
+from sacbus.cli.ss import ss_group
 from sacbus.cli.terminal import terminal_command
 
 __all__ = ["root", "run"]
@@ -56,6 +57,7 @@ def root(context: click.Context) -> int | None:
 for command in (
     serve_command,
     send_command,
+    ss_group,
     estop_command,
     scan_command,
     terminal_command,

@@ -10,9 +10,12 @@ __all__ = ["dissector_command"]
 
 
 @click.command("dissector")
+@click.argument("kind", default="sac")
 @verbose
-def dissector_command() -> None:
+def dissector_command(kind: str) -> None:
     """Print the path of the dissector, by which Wireshark and tshark read captures.
+
+    KIND is a kind of node, whose protocol it reads; sac when left out.
 
     A link to it in Wireshark's folder of personal Lua plugins installs it for good; Help, About,
     Folders and `tshark -G folders` tell which that is.
@@ -20,8 +23,13 @@ def dissector_command() -> None:
     \b
     Example: sacbus dissector
              tshark -X lua_script:"$(sacbus dissector)" -r capture.pcapng
-             ln -s "$(sacbus dissector)" ~/.local/lib/wireshark/plugins/
+             ln -s "$(sacbus dissector ss-mst67)" ~/.local/lib/wireshark/plugins/
     """
-    from sacbus.trace.capture import DISSECTOR
+    from sacbus.node import KindError, find_kind
 
-    click.echo(DISSECTOR)
+    found = find_kind(kind)
+    if found.protocol.dissector is None:
+        raise KindError(
+            f"no dissector for {found.protocol.name}, kind {kind}, its package brings none"
+        )
+    click.echo(found.protocol.dissector)

@@ -72,9 +72,9 @@ def _protocols(bus: BusDraft, findings: Findings) -> None:
     """All nodes speak what the bus is said to speak, or else what the first of them does."""
     spoken, says_so = bus.protocol, bus.table.at("protocol")
     for node in bus.nodes:
-        if node.kind is None:
+        if node.kind is None or node.protocol is None:
             continue
-        protocol = node.kind.protocol.name
+        protocol = node.protocol.name
         if spoken is None:
             spoken, says_so = protocol, node.table.at("kind")
         if protocol != spoken:

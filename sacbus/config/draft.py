@@ -16,11 +16,28 @@ from typing import Final
 from sacbus.config import lines
 from sacbus.config.keys import ANY_LINK, BUS, LINKS, NODE, TOP, Key, setting_keys, shown
 from sacbus.config.mistake import Findings
-from sacbus.config.notation import LOOPBACK, NotationError, endpoint, right_addresses
+from sacbus.config.notation import (
+    HIGHEST_ADDRESS,
+    LOOPBACK,
+    LOWEST_ADDRESS,
+    NotationError,
+    endpoint,
+    ranges,
+    right_addresses,
+)
 from sacbus.config.source import Source
 from sacbus.config.table import Table, nearest, remedy, tables
 from sacbus.links.places import AdapterAt, Place, PtyAt, Rfc2217At, TcpAt
-from sacbus.node import KindError, NodeKind, find_kind, kind_names, settings_from
+from sacbus.node import (
+    KindError,
+    NodeKind,
+    Protocol,
+    find_kind,
+    kind_names,
+    protocols_of,
+    settings_from,
+    spoken_by,
+)
 from sacbus.state import default_directory
 
 __all__ = ["BusDraft", "Draft", "LinkDraft", "NodeDraft", "draft"]
@@ -34,10 +51,14 @@ _DEFAULT_KIND: Final = str(_KIND.default)
 
 @dataclass(slots=True)
 class NodeDraft:
-    """One [[bus.nodes]]; what is wrong of it is left out: ``kind`` is None then."""
+    """One [[bus.nodes]]; what is wrong of it is left out: ``kind`` and ``protocol`` are None then.
+
+    ``protocol`` is what it speaks with its settings.
+    """
 
     table: Table
     kind: NodeKind | None
+    protocol: Protocol | None
     addresses: tuple[int, ...]
     settings: Mapping[str, object]
 
@@ -126,9 +147,10 @@ class _Reader:
             return None, _DEFAULT_KIND
         kinds = {one: self._kind(one) for one in kind_names()}
         speakers = {
-            kind.protocol.name: one
+            protocol.name: one
             for one, kind in kinds.items()
             if not isinstance(kind, KindError)
+            for protocol in protocols_of(kind)
         }
         if name in speakers:
             return name, speakers[name]
@@ -156,9 +178,10 @@ class _Reader:
             self._findings, path, content, (*NODE, *settings), whole=kind is not None
         )
         given = {key.name: table.values[key.name] for key in settings if key.name in table.values}
+        protocol = None if kind is None else kind.protocol
         if kind is not None and not table.unsure:
             try:
-                settings_from(kind.settings, given)
+                protocol = spoken_by(kind, settings_from(kind.settings, given))
             except ValueError as fault:  # what a kind has against settings that fit one by one
                 text = " ".join(str(fault).split())
                 hit = _ABOUT.fullmatch(text)
@@ -166,7 +189,7 @@ class _Reader:
                     self._findings.add((*path, hit[1]), hit[2], "correct it")
                 else:
                     self._findings.add(path, text, "correct it")
-        return NodeDraft(table, kind, self._addresses(table), given)
+        return NodeDraft(table, kind, protocol, self._addresses(table, protocol), given)
 
     def _kind_of(self, path: lines.Path, content: Mapping[str, object]) -> NodeKind | None:
         """The kind of a node, unless it is wrong, or may be hidden behind a misspelled key."""
@@ -194,7 +217,7 @@ class _Reader:
                 self._kinds[name] = fault
         return self._kinds[name]
 
-    def _addresses(self, table: Table) -> tuple[int, ...]:
+    def _addresses(self, table: Table, protocol: Protocol | None) -> tuple[int, ...]:
         one, several = table.get("address"), table.get("addresses")
         if one is not None and several is not None:
             what = "expected address or addresses, got both"
@@ -207,8 +230,23 @@ class _Reader:
             right, faults = right_addresses(several)
             for fault in faults:
                 self._findings.add(table.at("addresses"), fault, "correct it")
-            return right
-        return () if one is None else (one,)
+            return self._possible(right, table.at("addresses"), protocol)
+        if one is None:
+            return ()
+        return self._possible((one,), table.at("address"), protocol)
+
+    def _possible(
+        self, given: tuple[int, ...], path: lines.Path, protocol: Protocol | None
+    ) -> tuple[int, ...]:
+        """Those of some addresses that a node of this protocol may have."""
+        allowed = range(LOWEST_ADDRESS, HIGHEST_ADDRESS + 1)
+        if protocol is not None:
+            allowed = protocol.addresses
+        wrong = [one for one in given if one not in allowed]
+        if wrong:
+            what = f"expected addresses from {allowed[0]} to {allowed[-1]}, got {ranges(wrong)}"
+            self._findings.add(path, what, "correct it")
+        return tuple(one for one in given if one in allowed)
 
     # ---- links ----------------------------------------------------------------------------------
 

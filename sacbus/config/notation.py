@@ -25,8 +25,8 @@ __all__ = [
     "right_addresses",
 ]
 
-#: The addresses that a node may have: 0 is everybody, 1 mother, 2 and 3 are STX and ETX (manual).
-LOWEST_ADDRESS: Final = 4
+#: The addresses that a node of any kind may have; its protocol says which of them its own may.
+LOWEST_ADDRESS: Final = 0
 HIGHEST_ADDRESS: Final = 255
 
 #: Where a server listens when nothing else is said: nobody outside this machine gets in.

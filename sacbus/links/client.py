@@ -14,7 +14,7 @@ import socket
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 from urllib.parse import SplitResult, urlsplit
 
 from .errors import LinkError
@@ -49,6 +49,17 @@ class Wire(Protocol):
         """Let what was written go out, for a moment, and close; then nothing is left open."""
 
 
+@runtime_checkable
+class MarkingWire(Wire, Protocol):
+    """A wire that can give bytes a ninth bit: mark parity where it is 1, space where it is 0."""
+
+    def check_marking(self) -> None:
+        """LinkError where this very one cannot."""
+
+    def send_marked(self, data: bytes, ninth: bytes) -> object:
+        """Write without waiting, ``ninth`` a 0 or 1 for each byte; one call at a time."""
+
+
 class Line:
     """An open line: bytes in both directions, and its end. The same for every kind of LINK."""
 
@@ -71,6 +82,18 @@ class Line:
         """Write without waiting; what is written to a line that is gone is lost with it."""
         if self._wire is not None:
             self._wire.send(data)
+
+    def check_marking(self) -> None:
+        """LinkError for a line that carries no ninth bits."""
+        wire = self._wire
+        if not isinstance(wire, MarkingWire):
+            raise no_ninth_bits(self._where)
+        wire.check_marking()
+
+    def send_marked(self, data: bytes, ninth: bytes) -> None:
+        """As :meth:`send`, with a ninth bit of 0 or 1 for each byte; one call at a time."""
+        if isinstance(self._wire, MarkingWire):
+            self._wire.send_marked(data, ninth)
 
     def set_dtr(self, *, asserted: bool) -> bool:
         """Set the DTR output of a serial port, now; False where there is none, or it is gone."""
@@ -162,6 +185,13 @@ def endpoint(link: str) -> tuple[str, int, SplitResult]:
         given = parts.netloc.rpartition(":")[2]
         raise LinkError(f"{given!r} is not a port number", link, "give one from 1 to 65535")
     return host, port, parts
+
+
+def no_ninth_bits(link: str) -> LinkError:
+    """Why 9-bit mode cannot be had there."""
+    return LinkError(
+        "no ninth bits there", link, "take a serial port, or one behind RFC 2217, or 8-bit mode"
+    )
 
 
 def unreachable(link: str, host: str, fault: BaseException) -> LinkError:

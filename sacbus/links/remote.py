@@ -19,7 +19,9 @@ import asyncio
 import contextlib
 import socket
 import threading
+import time
 import warnings
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -28,6 +30,7 @@ from serial import rfc2217
 
 from .client import BOUND, unreachable
 from .errors import LinkError
+from .marking import NINE_BITS, runs
 
 __all__ = ["RemotePort"]
 
@@ -78,6 +81,8 @@ class _Port(rfc2217.Serial):
 
     def __init__(self, heard: _Heard) -> None:
         self._heard = heard
+        #: The parity that was asked for last.
+        self._asked = ""
         super().__init__()
 
     @property
@@ -106,6 +111,12 @@ class _Port(rfc2217.Serial):
     def rfc2217_set_control(self, value: bytes) -> None:
         """RTS, DTR and the like: asked for, and not insisted upon."""
         self._rfc2217_options["control"].set(value)
+
+    def ask_parity(self, parity: str) -> None:
+        """Have the server set it before what is written next; pyserial's own setting waits."""
+        if parity != self._asked:
+            self._asked = parity
+            self._rfc2217_options["parity"].set(bytes((rfc2217.RFC2217_PARITY_MAP[parity],)))
 
     def close(self) -> None:
         """Close the socket whatever state it is in, and see its reader's thread end."""
@@ -152,6 +163,7 @@ class RemotePort:
         #: What is to be written, and whether anything more will be; both under the condition.
         self._work = threading.Condition()
         self._waiting = bytearray()
+        self._marked: deque[tuple[str, bytes]] = deque()
         self._closing = False
 
     async def open(self) -> None:
@@ -174,6 +186,15 @@ class RemotePort:
             if len(self._waiting) + len(data) <= BOUND:
                 self._waiting += data
                 self._work.notify()
+
+    def check_marking(self) -> None:
+        """Its server is asked for the parity when there is something to send."""
+
+    def send_marked(self, data: bytes, ninth: bytes) -> None:
+        """Have it written, each run of bytes with the parity that makes their ninth bits."""
+        with self._work:
+            self._marked += runs(data, ninth)
+            self._work.notify()
 
     def set_dtr(self, *, asserted: bool) -> bool:  # noqa: ARG002 (as other wires)
         """Not here: when a server would have set it nobody knows."""
@@ -201,6 +222,10 @@ class RemotePort:
             with contextlib.suppress(OSError):  # the reader tells of it
                 while data := self._next():
                     self._port.write(data)
+                    if self._marked:
+                        # RFC 2217 has no word for "when these are out": wait for as long as the
+                        # line takes, or the parity changes under them.
+                        time.sleep(len(data) * NINE_BITS / self._port.baudrate)
         finally:
             self._port.close()
             self._on_loop(self._ended.set)
@@ -208,7 +233,11 @@ class RemotePort:
     def _next(self) -> bytes:
         """What is to be written next; b"" when that was all."""
         with self._work:
-            self._work.wait_for(lambda: self._waiting or self._closing)
+            self._work.wait_for(lambda: self._waiting or self._marked or self._closing)
+            if self._marked:
+                parity, data = self._marked.popleft()
+                self._port.ask_parity(parity)
+                return data
             data = bytes(self._waiting)
             self._waiting.clear()
             return data

@@ -27,14 +27,16 @@ import contextlib
 import errno
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import serial
 import serial_asyncio
 
+from .client import no_ninth_bits
 from .errors import LinkError
 from .hardware import set_dtr
+from .marking import PARITIES, runs
 
 if sys.platform != "win32":
     import termios
@@ -130,6 +132,9 @@ class SerialConnection(asyncio.Protocol):
         self._hear = hear
         self._lose = lose
         self._byte_s = _BITS / max(baud, 1)  # one that cannot be had is refused below
+        self._path = path
+        #: What writes marked bytes; kept, since a loop forgets what nobody keeps.
+        self._marking: asyncio.Future[None] | None = None
         self._failing = False
         self._ended = False
         #: Bytes that the port had not taken when it was lost.
@@ -166,6 +171,36 @@ class SerialConnection(asyncio.Protocol):
         if rest:
             self._transport.write(rest)
         return taken + len(rest)
+
+    def check_marking(self) -> None:
+        """LinkError for a port that takes no parity, as a pseudo-terminal."""
+        if sys.platform == "win32":
+            return
+        try:
+            self.port.parity = PARITIES[1]
+            takes = termios.tcgetattr(self.port.fileno())[2] & termios.PARENB
+        except FAULTS:
+            takes = 0
+        if not takes:
+            raise no_ninth_bits(self._path)
+
+    def send_marked(self, data: bytes, ninth: bytes) -> None:
+        """Write with a ninth bit for each byte, in a thread: it waits until one run of them is out.
+
+        One call at a time: whoever sends marked bytes waits for an answer before the next.
+        """
+        marked = tuple(runs(data, ninth))
+        self._marking = self._loop.run_in_executor(None, self._write_marked, marked)
+
+    def _write_marked(self, marked: Sequence[tuple[str, bytes]]) -> None:
+        try:
+            for parity, data in marked:
+                self.port.parity = parity
+                self.port.write(data)
+                super(_Port, self.port).flush()
+        except FAULTS as fault:
+            if not self._ended:
+                self._loop.call_soon_threadsafe(self._failed, _words(fault))
 
     def set_dtr(self, *, asserted: bool) -> bool:
         """Set the DTR output now; False where there is none, or the port is gone."""

@@ -13,7 +13,7 @@ from typing import Any, Final, assert_never
 import click
 
 from sacbus.kernel import US, Ns
-from sacbus.node import Report
+from sacbus.node import MASTER, Report
 from sacbus.watch import (
     Collision,
     Entry,
@@ -142,10 +142,13 @@ class JsonPage:
                 }
                 if said.kind == "garbage":
                     return fields | {"words": said.words, "bytes": entry.raw.hex()}
-                fields |= {"source": said.source, "destination": said.destination}
+                fields |= {
+                    "source": _address(said.source),
+                    "destination": _address(said.destination),
+                }
                 if said.kind == "packet":
                     fields |= {
-                        "body": said.data.decode("latin-1"),
+                        "body": said.body,
                         "words": said.words,
                         "verdict": said.verdict,
                     }
@@ -159,9 +162,9 @@ class JsonPage:
                 return fields | {"bytes": entry.raw.hex()}
             case Unanswered(time, request):
                 return self._begin("no answer", time) | {
-                    "source": request.said.source,
-                    "destination": request.said.destination,
-                    "body": request.said.data.decode("latin-1"),
+                    "source": _address(request.said.source),
+                    "destination": _address(request.said.destination),
+                    "body": request.said.body,
                     "request_ns": request.start,
                 }
             case Collision():
@@ -219,11 +222,21 @@ def _way(entry: Spoken) -> str:
     said = entry.said
     if said.source is None:
         return ""
-    return f"{said.source:>3} -> {said.destination or 'all':<3}"
+    to = "all" if said.general else _name(said.destination)
+    return f"{_name(said.source):>3} -> {to:<3}"
+
+
+def _name(address: int | None) -> str:
+    return "-" if address in (MASTER, None) else str(address)
+
+
+def _address(address: int | None) -> int | None:
+    """As JSON has it: a master without an address is null."""
+    return None if address == MASTER else address
 
 
 def _body(entry: Spoken) -> str:
-    return entry.said.data.decode("latin-1")
+    return entry.said.body
 
 
 def _to(request: Spoken) -> str:

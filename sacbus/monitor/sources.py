@@ -16,7 +16,7 @@ from sacbus.links import open_line
 from sacbus.monitor.output import Output
 from sacbus.monitor.pcap import Looked
 from sacbus.monitor.wanted import Wanted
-from sacbus.node import KindError, Protocol, Report, find_kind, kinds
+from sacbus.node import KindError, Protocol, Report, find_kind, find_protocol, protocols_of
 from sacbus.watch import FEED_SLACK, LINK_SLACK, Summary, Watch
 
 __all__ = ["watch_feed", "watch_link"]
@@ -85,7 +85,8 @@ async def watch_link(link: str, wanted: Wanted, output: Output, summary: Summary
     """
     protocol = find_kind(wanted.kind or DEFAULT_KIND).protocol
     rate = LineRate(wanted.baud or protocol.rate.baud, protocol.rate.bits)
-    watch = Watch(protocol, rate, slack=LINK_SLACK, summary=summary)
+    heard = protocol.lanes - 1
+    watch = Watch(protocol, rate, first=heard, slack=LINK_SLACK, summary=summary)
     loop = asyncio.get_running_loop()
     gone: asyncio.Future[str] = loop.create_future()
     timer: asyncio.TimerHandle | None = None
@@ -138,23 +139,14 @@ def _slack(hello: Hello) -> Ns:
 
 def _protocol_of(hello: Hello, kind: str | None) -> Protocol:
     """What the bus speaks, from a kind that is installed here; KindError when none speaks it."""
-    likely = [kind] if kind is not None else [name for _, name in hello.nodes] + [DEFAULT_KIND]
-    for name in dict.fromkeys(likely):
-        try:
-            protocol = find_kind(name).protocol
-        except KindError:
-            if kind is not None:
-                raise
-            continue
-        if kind is not None or protocol.name == hello.protocol:
-            return protocol
-    for one in kinds().values():
-        if one.protocol.name == hello.protocol:
-            return one.protocol
-    raise KindError(
-        f"no node kind that is installed speaks {hello.protocol!r}, bus {hello.bus}, "
-        "install the package of its nodes"
-    )
+    if kind is not None:
+        asked = find_kind(kind)
+        spoken = [one for one in protocols_of(asked) if one.name == hello.protocol]
+        return spoken[0] if spoken else asked.protocol
+    try:
+        return find_protocol(hello.protocol, [name for _, name in hello.nodes])
+    except KindError as fault:
+        raise KindError(f"{fault}, bus {hello.bus}, install the package of its nodes") from fault
 
 
 def _in_words(hello: Hello) -> str:

@@ -14,7 +14,10 @@ from sacbus.language.line import quoted
 from sacbus.mother.errors import BadRequest
 from sacbus.wire import ACK, ETX, MAX_BODY, NUL, STX, crc8
 
-__all__ = ["checked_address", "safe_body"]
+__all__ = ["SPEAKS", "checked_address", "safe_body"]
+
+#: The protocol of what mother sends, as a bus calls it.
+SPEAKS: Final = "sac"
 
 #: CRC bytes that the device takes for "no CRC", a new packet, a second ETX.
 _UNSAFE_CRCS: Final = frozenset((NUL, STX, ETX))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, runtime_checkable
 from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
@@ -19,6 +19,7 @@ __all__ = [
     "OFF",
     "STANDBY",
     "Heard",
+    "MistunedNode",
     "Node",
     "PinError",
     "Pins",
@@ -44,7 +45,8 @@ class Heard:
     without a pause. ``ninth`` holds a 0 or 1 for each of them where the line has ninth bits and the
     sender sent some. ``following`` is what its sender goes on with behind ``data``: a device sees
     each of these bytes begin in time, so it may take into account that they come, and when. What
-    they turn out to be is heard later, if at all.
+    they turn out to be is heard later, if at all. ``framing`` holds a 1 for each byte whose stop
+    bit did not come; None where all did.
     """
 
     data: bytes
@@ -53,6 +55,7 @@ class Heard:
     rate: LineRate
     following: bytes
     ninth: bytes | None = None
+    framing: bytes | None = None
 
     def begins(self, index: int) -> Ns:
         """When byte ``index`` of ``data`` began (its start bit)."""
@@ -264,4 +267,14 @@ class Node(Contract):
 
     def persist(self) -> Mapping[str, object]:
         """The contents of its EEPROM, as JSON has them. Cheap: it is asked at each change."""
+        ...
+
+
+@runtime_checkable
+class MistunedNode(Contract):
+    """What a node has besides whose UART may run at a rate of its own."""
+
+    @property
+    def uart_baud(self) -> int | None:
+        """That rate, as it is put on its line; None: the line's."""
         ...

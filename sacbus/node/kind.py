@@ -6,10 +6,10 @@ project's own no differently from a third party's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Final
+from typing import Any, Final, runtime_checkable
 from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
@@ -26,9 +26,13 @@ __all__ = [
     "MemoryValue",
     "MemoryWords",
     "NodeKind",
+    "PolyglotKind",
     "find_kind",
+    "find_protocol",
     "kind_names",
     "kinds",
+    "protocols_of",
+    "spoken_by",
 ]
 
 GROUP: Final = "sacbus.nodes"
@@ -78,7 +82,12 @@ class NodeKind(Contract):
 
     @property
     def protocol(self) -> Protocol:
-        """The protocol its nodes speak."""
+        """The protocol its nodes speak when their settings are the defaults."""
+        ...
+
+    @property
+    def drawn(self) -> Mapping[str, int]:
+        """The inputs that pictures of a node show, each with its level while nobody drives it."""
         ...
 
     @property
@@ -122,6 +131,23 @@ class NodeKind(Contract):
         ...
 
 
+@runtime_checkable
+class PolyglotKind(Contract):
+    """What a kind gives besides whose nodes can be set to speak one protocol or another."""
+
+    @property
+    def protocols(self) -> Sequence[Protocol]:
+        """All of them, the default first."""
+        ...
+
+    def speaks(
+        self,
+        settings: Any,  # noqa: ANN401 (an instance of the kind's own settings)
+    ) -> Protocol:
+        """The one that a node with these settings speaks."""
+        ...
+
+
 class KindError(LookupError):
     """A node kind that is not installed, or that could not be loaded. The text is for users."""
 
@@ -145,6 +171,33 @@ def find_kind(name: str) -> NodeKind:
             return _load(entry)
     have = ", ".join(kind_names()) or "none: is sacbus installed?"
     raise KindError(f"node kind {name!r} is not installed; installed kinds: {have}")
+
+
+def protocols_of(kind: NodeKind) -> Sequence[Protocol]:
+    """All protocols that nodes of a kind can speak, the default first."""
+    return kind.protocols if isinstance(kind, PolyglotKind) else (kind.protocol,)
+
+
+def spoken_by(kind: NodeKind, settings: NodeSettings) -> Protocol:
+    """The protocol that a node of a kind speaks with these settings."""
+    return kind.speaks(settings) if isinstance(kind, PolyglotKind) else kind.protocol
+
+
+def find_protocol(name: str, likely: Iterable[str] = ()) -> Protocol:
+    """The protocol of that name, looked for in the ``likely`` kinds first.
+
+    KindError when no kind that is installed speaks it.
+    """
+    names = dict.fromkeys((*likely, *kind_names()))
+    for one in names:
+        try:
+            kind = find_kind(one)
+        except KindError:
+            continue  # another one may speak it
+        for protocol in protocols_of(kind):
+            if protocol.name == name:
+                return protocol
+    raise KindError(f"no node kind that is installed speaks {name!r}")
 
 
 def _load(entry: EntryPoint) -> NodeKind:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 from typing import Protocol as Contract
 
@@ -14,6 +15,7 @@ from sacbus.kernel import LineRate, Ns
 
 __all__ = [
     "EVERYONE",
+    "MASTER",
     "Decoder",
     "Protocol",
     "Said",
@@ -22,16 +24,20 @@ __all__ = [
 #: What :meth:`Protocol.addressed` gives when all nodes must hear.
 EVERYONE: Final = None
 
+#: Stands for the master in :class:`Said` where a protocol gives it no address.
+MASTER: Final = -1
+
 
 @dataclass(frozen=True, slots=True)
 class Said:
     """What one of a decoder's events says, in a form that is every protocol's.
 
     ``kind``: ``packet``, ``ack``, ``nak`` (an answer to a packet) or ``garbage``, which has no
-    ``source`` and no ``destination`` (0: everybody). ``data`` is a packet's body, or the garbage as
-    it came. ``words`` say what it means, without addresses. ``verdict`` is what the check says:
-    ``right``, ``unchecked`` (none was sent), ``wrong``, or a word of the protocol's own for what
-    else is wrong; empty where nothing is to be checked. ``size``: bytes on the wire.
+    ``source`` and no ``destination``. ``general``: it is for everybody. ``data`` is a packet's
+    body, or the garbage as it came. ``words`` say what it means, without addresses. ``verdict`` is
+    what the check says: ``right``, ``unchecked`` (none was sent), ``wrong``, or a word of the
+    protocol's own for what else is wrong; empty where nothing is to be checked. ``size``: bytes on
+    the wire. ``binary``: the body is no text.
     ``reply_after``: how long after the end of a packet its answer begins, by the protocol's
     figures, in ns; None when nobody answers it.
     """
@@ -44,6 +50,13 @@ class Said:
     verdict: str
     size: int
     reply_after: Ns | None = None
+    general: bool = False
+    binary: bool = False
+
+    @property
+    def body(self) -> str:
+        """``data`` as people are shown it: as text, or in hexadecimal where it is ``binary``."""
+        return self.data.hex(" ") if self.binary else self.data.decode("latin-1")
 
 
 class Decoder(Contract):
@@ -59,11 +72,11 @@ class Decoder(Contract):
         """Whether what is pending may yet become a packet; noise never does."""
         ...
 
-    def receive(self, data: bytes) -> Sequence[object]:
-        """The events that these bytes complete."""
+    def receive(self, data: bytes, ninth: bytes | None = None) -> Sequence[object]:
+        """The events that these bytes complete; ``ninth``: a 0 or 1 for each, where known."""
         ...
 
-    def locate(self, data: bytes) -> Sequence[tuple[object, int, int]]:
+    def locate(self, data: bytes, ninth: bytes | None = None) -> Sequence[tuple[object, int, int]]:
         """As :meth:`receive`, each with the places of its first byte and behind its last.
 
         Places count from the first byte of ``data``; those before it are negative.
@@ -89,6 +102,28 @@ class Protocol(Contract):
         """The line rate that its devices leave the factory with."""
         ...
 
+    @property
+    def addresses(self) -> range:
+        """The addresses that a node may have."""
+        ...
+
+    @property
+    def link_type(self) -> int | None:
+        """The link type of its bytes in a capture, of the USER ones (147 to 162); None: any."""
+        ...
+
+    @property
+    def dissector(self) -> Path | None:
+        """The Lua file by which Wireshark reads such captures; None: there is none."""
+        ...
+
+    def patience(self, byte: Ns) -> Ns | None:
+        """Silence after which a device gives up what has not come whole; None: it never does.
+
+        ``byte`` is what one takes on the line.
+        """
+        ...
+
     def cuts(self, data: bytes) -> Sequence[int]:
         """Offsets at which a node may have to act before the transmission is over, ascending."""
         ...
@@ -97,8 +132,8 @@ class Protocol(Contract):
         """Addresses that these bytes open a packet for; EVERYONE when all nodes must hear."""
         ...
 
-    def decoder(self) -> Decoder:
-        """A new receiver for those who listen to everything."""
+    def decoder(self, lane: int = 0) -> Decoder:
+        """A new receiver for those who listen to everything that is on a lane."""
         ...
 
     def tell(self, event: object) -> Said:

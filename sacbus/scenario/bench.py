@@ -37,8 +37,8 @@ _WARN: Final = (ReportKind.WARNING, ReportKind.REFUSED, ReportKind.OVERRUN)
 class Bench:
     """One bus under a scenario. Everything is called at the time of ``clock``.
 
-    ``talk`` puts bytes on the line as they are; ``unsent`` tells how many of them wait for it.
-    ``hosted`` is None where only the line is there.
+    ``talk`` puts bytes on the line as they are, ``say`` does so with ninth bits; ``unsent`` tells
+    how many of them wait for it. ``hosted`` is None where only the line is there.
     """
 
     def __init__(
@@ -49,11 +49,13 @@ class Bench:
         talk: Callable[[bytes], None],
         unsent: Callable[[], int],
         span: Callable[[int], Ns],
+        say: Callable[[bytes, bytes | None], None],
     ) -> None:
         self.name = name
         self.clock = clock
         self.line = Line(protocol)
         self.talk = talk
+        self.say = say
         self.unsent = unsent
         self.span = span
         self.caller: Caller
@@ -131,7 +133,12 @@ def hosted_bench(hosted: HostedBus) -> Bench:
         bench.caller.hear(heard.data)
 
     port = Port(bus.medium, hear, latency=0, name="mother")
-    bench = Bench(bus.name, kernel, bus.protocol, port.talk, lambda: port.unsent, bus.rate.span)
+
+    def say(data: bytes, ninth: bytes | None) -> None:
+        port.talk(data, bytes(len(data)) if ninth is None else ninth)
+
+    protocol, span = bus.protocol, bus.rate.span
+    bench = Bench(bus.name, kernel, protocol, port.talk, lambda: port.unsent, span, say)
     bench.caller = Caller(kernel, port.talk, rate=bus.rate, unsent=lambda: port.unsent)
     _watch(bench, hosted)
     return bench
@@ -140,7 +147,16 @@ def hosted_bench(hosted: HostedBus) -> Bench:
 def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
     """A bus in this process, with mother at the far end of one of its links, in real time."""
     kernel, bus = hosted.host.kernel, hosted.bus
-    bench = Bench(bus.name, kernel, bus.protocol, link.send, lambda: 0, bus.rate.span)
+    # The link's end is a pty, which has no ninth bits: bytes with some get on the line beside it.
+    beside = Port(bus.medium, _deaf, latency=0, name="mother")
+
+    def say(data: bytes, ninth: bytes | None) -> None:
+        if ninth is None:
+            link.send(data)
+        else:
+            hosted.host.arrive(beside.talk, data, ninth)
+
+    bench = Bench(bus.name, kernel, bus.protocol, link.send, lambda: 0, bus.rate.span, say)
     bench.caller = Caller(kernel, link.send, rate=bus.rate, slack=slack)
     _watch(bench, hosted)
     link.start(
@@ -162,13 +178,21 @@ def far_bench(
 
     def hear(data: bytes) -> None:
         now = clock.now
-        bench.line.note(Passed(max(now - rate.span(len(data)), 0), now, 0, "line", data))
+        begun = max(now - rate.span(len(data)), 0)
+        bench.line.note(Passed(begun, now, protocol.lanes - 1, "line", data))
         bench.caller.hear(data)
 
-    bench = Bench(name, clock, protocol, send, lambda: 0, rate.span)
+    def say(data: bytes, _ninth: bytes | None) -> None:
+        send(data)
+
+    bench = Bench(name, clock, protocol, send, lambda: 0, rate.span, say)
     bench.caller = Caller(clock, send, rate=rate, slack=slack)
     link.start(hear, bench.caller.lose)
     return bench
+
+
+def _deaf(_heard: Heard, _now: Ns) -> None:
+    """Hears nothing."""
 
 
 def _watch(bench: Bench, hosted: HostedBus) -> None:
@@ -186,7 +210,9 @@ def _watch(bench: Bench, hosted: HostedBus) -> None:
         data = sent.data
         if sent.hits is not None or sent.passage is not None:
             data = sent.outcome(seed)
-        line.note(Passed(sent.start, sent.end, sent.lane, who, data, sent.collided, sent.faults))
+        ninth = sent.outcome_ninth(seed)
+        collided, faults = sent.collided, sent.faults
+        line.note(Passed(sent.start, sent.end, sent.lane, who, data, collided, faults, ninth))
         bench.stir()
 
     def report(told: Report) -> None:

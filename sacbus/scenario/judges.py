@@ -298,8 +298,10 @@ class _PacketJudge:
         self._expected = expected
         protocol = bench.line.protocol
         self._tell = protocol.tell
-        self._decoder = protocol.decoder
-        self._decoders = {0: protocol.decoder(), 1: protocol.decoder()}
+        self._patience = protocol.patience(bench.span(1))
+        self._decoders = [protocol.decoder(lane) for lane in (0, 1)]
+        #: When what was last on each lane ended.
+        self._heard_until: list[Ns] = [0, 0]
         self._pattern = None if expected.pattern is None else re.compile(expected.pattern)
         self._seen = 0
         self._others = 0
@@ -314,7 +316,11 @@ class _PacketJudge:
                 self._passed(passed)
 
     def _passed(self, passed: Passed) -> None:
-        for event in self._decoders[passed.lane].receive(passed.data):
+        lane = passed.lane
+        silence, self._heard_until[lane] = passed.start - self._heard_until[lane], passed.end
+        if self._patience is not None and silence >= self._patience:
+            self._decoders[lane] = self._bench.line.protocol.decoder(lane)
+        for event in self._decoders[lane].receive(passed.data, passed.ninth):
             if self._fits(self._tell(event)):
                 self._seen += 1
                 if self._seen == self._expected.count:
@@ -330,10 +336,7 @@ class _PacketJudge:
             and wanted.source in (None, said.source)
             and wanted.destination in (None, said.destination)
             and wanted.body in (None, said.data)
-            and (
-                self._pattern is None
-                or self._pattern.fullmatch(said.data.decode("latin-1")) is not None
-            )
+            and (self._pattern is None or self._pattern.fullmatch(said.body) is not None)
         )
 
     def _late(self) -> None:

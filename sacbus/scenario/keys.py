@@ -12,7 +12,7 @@ from typing import Final
 from sacbus.config.keys import Key
 from sacbus.config.notation import NotationError, addresses
 from sacbus.scenario.parameters import RESERVED, is_value
-from sacbus.scenario.quantity import TIME, QuantityError, bounds, nanoseconds
+from sacbus.scenario.quantity import TIME, QuantityError, bounds, marked_bytes, nanoseconds
 
 __all__ = [
     "DEEDS",
@@ -84,13 +84,13 @@ def _is_nodes(value: object) -> bool:
         except NotationError:
             return False
         return True
-    return value == "all" or _whole(4, 255)(value)
+    return value == "all" or _whole(0, 255)(value)
 
 
 def _is_hex(value: object) -> bool:
     try:
-        return isinstance(value, str) and bool(bytes.fromhex(value))
-    except ValueError:
+        return isinstance(value, str) and bool(marked_bytes(value)[0])
+    except QuantityError:
         return False
 
 
@@ -191,7 +191,12 @@ STEP: Final = (
 #: What a step does: exactly one of these, or none with ``wait``.
 DEEDS: Final = (
     Key("send", 'a line such as "10m400", or several', _is_lines, "mother sends it, with retries"),
-    Key("raw", "bytes in hexadecimal", _is_hex, "put on the line as they are"),
+    Key(
+        "raw",
+        "bytes in hexadecimal, ^ before each whose ninth bit is 1",
+        _is_hex,
+        "put on the line as they are",
+    ),
     Key("type", "a table", _is_table, "keys at a terminal"),
     Key("pin", "a table", _is_table, "inputs of nodes driven to levels"),
     Key("turn", "a table", _is_table, "the encoder turned"),

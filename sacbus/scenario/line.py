@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from sacbus.kernel import SECOND, Ns
-from sacbus.node import Protocol, Said
+from sacbus.node import MASTER, Protocol, Said
 
 __all__ = ["Line", "Passed"]
 
@@ -35,6 +35,8 @@ class Passed:
     collided: bool = False
     #: The faults that acted on it.
     faults: tuple[str, ...] = ()
+    #: A 0 or 1 for each byte, where that is known.
+    ninth: bytes | None = None
 
 
 class Line:
@@ -58,7 +60,7 @@ class Line:
 
     def _words(self, passed: Passed, origin: Ns) -> str:
         protocol = self.protocol
-        events = protocol.decoder().receive(passed.data)
+        events = protocol.decoder(passed.lane).receive(passed.data, passed.ninth)
         said = "; ".join(_said(protocol.tell(event)) for event in events)
         hit = "".join(f", {one}" for one in (*passed.faults, *["collided"][: passed.collided]))
         raw = passed.data[:24].hex(" ") or "nothing"
@@ -70,7 +72,7 @@ def _said(said: Said) -> str:
     if said.kind == "garbage":
         return f"garbage {said.data[:24].hex(' ')}"
     verdict = "" if said.verdict in ("right", "") else f", CRC {said.verdict}"
-    where = "all" if said.destination == 0 else said.destination
+    where = "all" if said.general else "master" if said.destination == MASTER else said.destination
     if said.kind == "packet":
-        return f"to {where} {said.data.decode('latin-1')!r}, {said.words}{verdict}"
+        return f"to {where} {said.body!r}, {said.words}{verdict}"
     return f"{said.kind.upper()} to {where}{verdict}"

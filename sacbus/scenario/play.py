@@ -139,9 +139,9 @@ class Play:
                 self._send(index, send, 0)
             case Poll() as poll:
                 self._begin_poll(index, poll)
-            case Raw(data, bus):
+            case Raw(data, bus, ninth):
                 bench = self._bench(bus)
-                bench.talk(data)
+                bench.say(data, ninth)
                 self._out_at(self._clock.now + bench.span(len(data)), index, bench)
             case Disturb(fault, bus):
                 hosted = self._bench(bus).hosted

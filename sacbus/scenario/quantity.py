@@ -1,4 +1,4 @@
-"""Times and bounds as people write them in a scenario: ``"250 ms"``, ``400``, ``[399, 401]``.
+"""Times, bounds and bytes as people write them: ``"250 ms"``, ``[399, 401]``, ``"^18 0c"``.
 
 Owns these notations, both ways. A QuantityError says what was expected and what came; who asked
 adds the place. Times are whole ns: what a text says beyond that is refused, never rounded.
@@ -15,7 +15,16 @@ from typing import Final, TypeGuard
 from sacbus.config.keys import shown
 from sacbus.kernel import MS, SECOND, US, Ns
 
-__all__ = ["LONGEST", "TIME", "Bounds", "QuantityError", "bounds", "nanoseconds", "time_text"]
+__all__ = [
+    "LONGEST",
+    "TIME",
+    "Bounds",
+    "QuantityError",
+    "bounds",
+    "marked_bytes",
+    "nanoseconds",
+    "time_text",
+]
 
 #: How a time is asked for.
 TIME: Final = 'a time such as "250 ms" (ns, us, ms, s, min, h)'
@@ -102,6 +111,24 @@ def bounds(value: object) -> Bounds:
         limit = float(found[2])
         return Bounds(-inf, limit) if found[1] == "<" else Bounds(limit, inf)
     raise QuantityError(f'expected a number, [low, high], "<= 3" or ">= 3", got {shown(value)}')
+
+
+def marked_bytes(text: str) -> tuple[bytes, bytes | None]:
+    """``^18 04 0f``: bytes, and the ninth bit of each, which is 1 behind a ``^``; None: no such.
+
+    QuantityError for what is no bytes in hexadecimal, and for a ``^`` without a byte behind it.
+    """
+    marked, data = bytearray(), bytearray()
+    for place, part in enumerate(text.split("^")):
+        try:
+            run = bytes.fromhex(part)
+        except ValueError:
+            run = b""
+        if not run and (place or part.strip()):
+            raise QuantityError(f"expected bytes in hexadecimal, got {shown(text)}")
+        marked += bytes((1, *bytes(len(run) - 1))) if place else bytes(len(run))
+        data += run
+    return bytes(data), bytes(marked) if "^" in text else None
 
 
 def _is_number(value: object) -> TypeGuard[float]:

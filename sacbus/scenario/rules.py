@@ -18,7 +18,7 @@ from sacbus.config.notation import ranges
 from sacbus.configuration import Configuration, check
 from sacbus.kernel import LineRate
 from sacbus.mother import BadRequest, addressed_line, safe_body
-from sacbus.mother.request import checked_address
+from sacbus.mother.request import SPEAKS, checked_address
 from sacbus.node import Node, PinError, find_kind, settings_from
 from sacbus.scenario.expectations import (
     Counted,
@@ -117,6 +117,8 @@ def line_complaints(scenario: Scenario) -> Iterator[Complaint]:
 
 def _beyond_a_line(deed: Deed | str | None) -> str | None:
     match deed:
+        case Raw(ninth=ninth) if ninth is not None:
+            return "ninth bits"
         case Type():
             return "keys at a terminal"
         case Pin():
@@ -200,6 +202,9 @@ class _Rules:
             case Send(lines=lines, outcome=outcome) | Poll(lines=lines, outcome=outcome):
                 if not lines:
                     yield "send", "expected one line at least, got none", "give one"
+                if (spoken := check(bus).name) != SPEAKS:
+                    what = f"expected a bus that speaks {SPEAKS} as mother does, got {spoken}"
+                    yield "send", what, "give bytes, as raw"
                 for line in lines:
                     yield from self._line(bus, line, outcome)
                 if isinstance(deed, Poll) and deed.every <= 0:

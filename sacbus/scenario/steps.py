@@ -33,6 +33,7 @@ from sacbus.scenario.keys import (
     TYPE,
 )
 from sacbus.scenario.parameters import Value, put_in
+from sacbus.scenario.quantity import marked_bytes
 from sacbus.scenario.values import (
     Deed,
     Disturb,
@@ -209,7 +210,8 @@ class StepReader:
                 lines_ = value if isinstance(value, list) else [value]
                 return self._send(table, tuple(map(str, lines_)), bus)
             case "raw":
-                return Raw(bytes.fromhex(value), bus)
+                data, ninth = marked_bytes(value)
+                return Raw(data, bus, ninth)
             case "mark":
                 return Mark(value)
             case "wait":

@@ -78,10 +78,14 @@ class Poll:
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """Bytes as they are, by mother's own port, without a transaction. Over when they are out."""
+    """Bytes as they are, by mother's own port, without a transaction. Over when they are out.
+
+    ``ninth``: a 0 or 1 for each, which a line without ninth bits leaves out; None: 0.
+    """
 
     data: bytes
     bus: str = ""
+    ninth: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True)

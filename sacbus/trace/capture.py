@@ -2,27 +2,21 @@
 
 Owns what of an entry goes where: its bytes, as they came, are the packet; the time is that of its
 first bit; what bytes alone do not tell stands in its comment, a line ``KEY: VALUE`` each.
-``sac.lua``, the dissector, reads comments and does without them (``docs/wireshark.md``). Writes
-nothing anywhere.
+A protocol's dissector reads comments and does without them (``docs/wireshark.md``). Writes nothing
+anywhere.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final, assert_never
 
 from sacbus import __version__
 from sacbus.kernel import LineRate, Ns
-from sacbus.trace.pcapng import LINKTYPE_USER0, LINKTYPE_USER1, interface, packet, section
+from sacbus.node import KindError, find_protocol
+from sacbus.trace.pcapng import LINKTYPE_USER1, interface, packet, section
 from sacbus.watch import Collision, Entry, Lost, Reported, Spoken, Unanswered
 
-__all__ = ["DISSECTOR", "Capture", "CapturedLine"]
-
-#: By which Wireshark reads what is written here.
-DISSECTOR: Final = Path(__file__).with_name("sac.lua")
-
-#: The dissector takes USER0 for SAC; bytes of other protocols must not get to it.
-_LINK_TYPES: Final = {"sac": LINKTYPE_USER0}
+__all__ = ["Capture", "CapturedLine"]
 
 
 class Capture:
@@ -51,7 +45,7 @@ class Capture:
         self._interfaces += lanes
         description = f"{protocol} at {rate.baud} baud" + (f", {times}" if times else "")
         names = [name] if lanes == 1 else [f"{name} lane {lane}" for lane in range(lanes)]
-        link_type = _LINK_TYPES.get(protocol, LINKTYPE_USER1)
+        link_type = _link_type(protocol)
         header = b"".join(
             interface(one, description, link_type=link_type, bits_per_second=rate.baud)
             for one in names
@@ -103,6 +97,15 @@ class CapturedLine:
         # One comment: each counts as a remark of its own in Wireshark's "Expert Information".
         comment = "\n".join(f"{key}: {_in_one_line(text)}" for key, text in remarks.items())
         return packet(self._first + lane, time, raw, (comment,), dropped=dropped)
+
+
+def _link_type(protocol: str) -> int:
+    """What tells Wireshark which dissector reads it; bytes of others must not get to that one."""
+    try:
+        own = find_protocol(protocol).link_type
+    except KindError:
+        own = None
+    return LINKTYPE_USER1 if own is None else own
 
 
 def _remarks(entry: Spoken) -> dict[str, str]:

@@ -12,7 +12,7 @@ from typing import BinaryIO, Final
 
 from sacbus import feed
 from sacbus.kernel import Ns
-from sacbus.node import KindError, Protocol, kinds
+from sacbus.node import KindError, Protocol, find_protocol
 from sacbus.trace.capture import Capture, CapturedLine
 from sacbus.trace.reading import Recording
 from sacbus.trace.records import BusAt, Record, Sent
@@ -88,13 +88,10 @@ class _Line:
 
 
 def _protocol_of(bus: BusAt) -> Protocol:
-    for kind in kinds().values():
-        if kind.protocol.name == bus.protocol:
-            return kind.protocol
-    raise KindError(
-        f"no node kind that is installed speaks {bus.protocol!r}, bus {bus.name}, "
-        "install the package of its nodes"
-    )
+    try:
+        return find_protocol(bus.protocol, [node.kind for node in bus.nodes])
+    except KindError as fault:
+        raise KindError(f"{fault}, bus {bus.name}, install the package of its nodes") from fault
 
 
 def _hits(records: Iterable[Record], buses: int) -> list[_Hits]:

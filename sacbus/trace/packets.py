@@ -9,7 +9,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from sacbus.kernel import Ns
-from sacbus.node import Decoder, Protocol, Said, find_kind
+from sacbus.node import Said, find_protocol
+from sacbus.trace.ear import Ear
 from sacbus.trace.records import BusAt, Record, Sent
 
 __all__ = ["Packet", "packets"]
@@ -38,15 +39,12 @@ def packets(bus: BusAt, records: Iterable[Record]) -> Iterator[Packet]:
     """
     if not bus.nodes:
         return
-    protocol: Protocol = find_kind(bus.nodes[0].kind).protocol
-    decoders: dict[int, Decoder] = {}
+    protocol = find_protocol(bus.protocol, [node.kind for node in bus.nodes])
+    ear = Ear(protocol, bus.rate)
     for sent in records:
         if type(sent) is not Sent:
             continue
-        decoder = decoders.get(sent.lane)
-        if decoder is None:
-            decoder = decoders[sent.lane] = protocol.decoder()
-        for event, first, last in decoder.locate(sent.arrived):
+        for event, first, last in ear.hear(sent):
             start = sent.start + bus.rate.span(max(first, 0))
             yield Packet(
                 start, sent.start + bus.rate.span(last), protocol.tell(event), sent, first, last

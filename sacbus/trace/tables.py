@@ -10,7 +10,8 @@ import csv
 from typing import Final, TextIO
 
 from sacbus.kernel import Ns
-from sacbus.node import Decoder, Protocol, find_kind
+from sacbus.node import MASTER, find_protocol
+from sacbus.trace.ear import Ear
 from sacbus.trace.reading import Recording
 from sacbus.trace.records import (
     BusAt,
@@ -38,7 +39,7 @@ def write_events(recording: Recording, out: TextIO) -> int:
     """What happened, in the order in which it was recorded; how many rows."""
     table = csv.writer(out, lineterminator="\n")
     table.writerow(EVENTS)
-    ears = [_Ear(bus) for bus in recording.buses]
+    ears = [_Words(bus) for bus in recording.buses]
     rows = 0
     for record in recording.events():
         row = _row(record, ears)
@@ -80,33 +81,35 @@ def write_positions(recording: Recording, out: TextIO, every: Ns) -> int:
     return rows
 
 
-class _Ear:
+class _Words:
     """What the transmissions on a bus say."""
 
     def __init__(self, bus: BusAt) -> None:
-        self._protocol: Protocol | None = None
+        self._ear: Ear | None = None
         if bus.nodes:
-            self._protocol = find_kind(bus.nodes[0].kind).protocol
-        self._decoders: dict[int, Decoder] = {}
+            kinds = [node.kind for node in bus.nodes]
+            self._ear = Ear(find_protocol(bus.protocol, kinds), bus.rate)
 
     def hear(self, sent: Sent) -> str:
         """What a transmission completes, in words."""
-        if self._protocol is None:
+        ear = self._ear
+        if ear is None:
             return ""
-        decoder = self._decoders.get(sent.lane)
-        if decoder is None:
-            decoder = self._decoders[sent.lane] = self._protocol.decoder()
-        said = [self._protocol.tell(event) for event in decoder.receive(sent.arrived)]
+        said = [ear.protocol.tell(event) for event, _, _ in ear.hear(sent)]
         return "; ".join(
             one.words
             if one.source is None
-            else f"{one.source}>{one.destination} {one.words}"
+            else f"{_name(one.source)}>{_name(one.destination)} {one.words}"
             + (f" ({one.verdict} check)" if one.verdict not in ("", "right") else "")
             for one in said
         )
 
 
-def _row(record: Record | Changed, ears: list[_Ear]) -> tuple[object, ...] | None:
+def _name(address: int | None) -> str:
+    return "" if address in (MASTER, None) else str(address)
+
+
+def _row(record: Record | Changed, ears: list[_Words]) -> tuple[object, ...] | None:
     """Node, event, value and text; None for what is no event of its own."""
     match record:
         case Sent(sender=sender, arrived=arrived):

@@ -5,9 +5,9 @@ one takes no more memory than a short one. The one place that meets pyvcd, two o
 matter: signals are declared before time goes on, and the end of the last one is written only when
 closing is told the time.
 
-Signals of a node: clk, those that its kind knows (of a SAC dir, ms1 to ms3, op_sa, op_sb), sync
-as it is driven, and tx_en, which is high while its bytes are on the line. Whoever has more to show
-on the same clock gives it as a ``Signal`` each.
+Signals of a node: clk, those that its kind knows (of a SAC dir, ms1 to ms3, op_sa, op_sb), inputs
+as they are driven (of a SAC sync), and tx_en, which is high while its bytes are on the line.
+Whoever has more to show on the same clock gives it as a ``Signal`` each.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from vcd import VCDWriter
 from vcd.writer import Variable
 
 from sacbus.kernel import MS, SECOND, Ns
+from sacbus.node import find_kind
 from sacbus.trace.reading import Recording
 from sacbus.trace.records import BusAt, Driven, Moved, NodeOf, Record, Sent
 from sacbus.trace.track import Track
@@ -49,7 +50,6 @@ MANY: Final = 400_000
 LONG: Final = 512
 
 _CLK: Final = "clk"
-_SYNC: Final = "sync"
 _TX_EN: Final = "tx_en"
 
 
@@ -153,7 +153,9 @@ class _Wires:
 
         self.clk = wire(_CLK, 0)
         self.levels = {name: wire(name, level) for name, level in levels.items()}
-        self.sync = wire(_SYNC, 1)
+        #: Inputs, at rest until they are driven.
+        drawn = find_kind(node.kind).drawn
+        self.inputs = {name: wire(name, level) for name, level in drawn.items()}
         self.tx_en = wire(_TX_EN, 0)
 
     def take(self, record: Record) -> None:
@@ -161,8 +163,8 @@ class _Wires:
         match record:
             case Moved(segment=segment):
                 self._track.segments.append(segment)
-            case Driven(when, pin="sync", level=level):
-                self._edges.append((when, self.sync, level))
+            case Driven(when, pin=pin, level=level) if pin in self.inputs:
+                self._edges.append((when, self.inputs[pin], level))
             case Sent(start=start, end=end):
                 self._edges += [(start, self.tx_en, 1), (end, self.tx_en, 0)]
             case _:

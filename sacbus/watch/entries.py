@@ -25,9 +25,6 @@ __all__ = [
     "is_fault",
 ]
 
-#: Where everybody is addressed.
-_EVERYBODY = 0
-
 
 @dataclass(frozen=True, slots=True)
 class Spoken:
@@ -126,7 +123,7 @@ def concerns(entry: Entry, nodes: Collection[int]) -> bool:
                 said.source is None
                 or said.source in nodes
                 or said.destination in nodes
-                or said.destination == _EVERYBODY
+                or said.general
             )
         case Collision(parts=parts):
             return any(part.node is None or part.node in nodes for part in parts)

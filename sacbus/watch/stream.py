@@ -22,6 +22,7 @@ class Stretch:
 
     ``hits``: from when to when others talked over them. ``squeezed``: they came in less time than
     the line takes for them, so they had waited somewhere, and may have begun before ``start``.
+    ``ninth``: a 0 or 1 for each of them, where that is known.
     """
 
     start: Ns
@@ -30,6 +31,7 @@ class Stretch:
     sender: str | None = None
     hits: Sequence[tuple[Ns, Ns]] = ()
     squeezed: bool = False
+    ninth: bytes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +55,11 @@ class Event:
 class Stream:
     """A lane as its listener hears it."""
 
-    def __init__(self, protocol: Protocol, rate: LineRate) -> None:
+    def __init__(self, protocol: Protocol, rate: LineRate, lane: int = 0) -> None:
         self._protocol = protocol
         self._rate = rate
-        self._decoder = protocol.decoder()
+        self._lane = lane
+        self._decoder = protocol.decoder(lane)
         #: Stretches with the number of their first byte, counted from the lane's first.
         self._kept: deque[tuple[int, Stretch]] = deque()
         self._count = 0
@@ -79,7 +82,7 @@ class Stream:
         tell = self._protocol.tell
         events = [
             self._event(tell(event), first + begin, first + end)
-            for event, begin, end in self._decoder.locate(stretch.data)
+            for event, begin, end in self._decoder.locate(stretch.data, stretch.ninth)
         ]
         undecided = self._count - len(self._decoder.pending)
         kept = self._kept
@@ -99,7 +102,7 @@ class Stream:
 
     def forget(self) -> None:
         """Begin anew: what comes next does not follow what came before."""
-        self._decoder = self._protocol.decoder()
+        self._decoder = self._protocol.decoder(self._lane)
         self._kept.clear()
 
     def _event(self, said: Said, begin: int, end: int) -> Event:

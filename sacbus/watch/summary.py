@@ -52,7 +52,7 @@ class Summary:
                 match said.kind:
                     case "packet":
                         self.packets += 1
-                        self.wrong += said.verdict not in ("right", "unchecked")
+                        self.wrong += said.verdict not in ("", "right", "unchecked")
                     case "ack":
                         self.acks += 1
                         if delay is not None:

@@ -36,8 +36,8 @@ ANSWER_ROOM: Final = 8
 #: Silence after which pending noise is told. It could not become anything else.
 NOISE_ENDS: Final[Ns] = 50 * MS
 
-#: Silence after which an unfinished packet is given up. Devices have no time-out: 2 s between two
-#: bytes were observed to be accepted.
+#: Silence after which an unfinished packet is given up where devices have no time-out: 2 s between
+#: two bytes were observed to be accepted.
 PACKET_ENDS: Final[Ns] = 3 * SECOND
 
 #: How long an answer that is overdue is still known as one, when it comes at all.
@@ -71,7 +71,10 @@ class _Lane:
 
 
 class Watch:
-    """What a line says. ``slack``: how late an answer may be beyond the protocol's figures."""
+    """What a line says. ``slack``: how late an answer may be beyond the protocol's figures.
+
+    ``lanes``: how many are heard, from number ``first`` on; a link hears that of the nodes alone.
+    """
 
     def __init__(
         self,
@@ -79,12 +82,17 @@ class Watch:
         rate: LineRate,
         *,
         lanes: int = 1,
+        first: int = 0,
         slack: Ns = FEED_SLACK,
         summary: Summary | None = None,
     ) -> None:
         self._rate = rate
         self._slack = slack
-        self._lanes = [_Lane(Stream(protocol, rate)) for _ in range(lanes)]
+        self._lanes = [_Lane(Stream(protocol, rate, first + one)) for one in range(lanes)]
+        patience = protocol.patience(rate.span(1))
+        # What a link brings may have waited on its way.
+        late = max(slack - FEED_SLACK, 0)
+        self._packet_ends = PACKET_ENDS if patience is None else patience + late
         #: Requests by who asked whom; of each pair only the last can be answered.
         self._open: dict[tuple[int, int], _Open] = {}
         #: Reports that wait for the transmission that they came of.
@@ -135,7 +143,7 @@ class Watch:
     def wake_at(self) -> Ns | None:
         """When something will be certain if nothing is heard until then; None: never."""
         times = [one.due for one in self._open.values() if not one.told]
-        times += [due for lane in self._lanes if (due := _gives_up(lane)) is not None]
+        times += [due for lane in self._lanes if (due := self._gives_up(lane)) is not None]
         return min(times, default=None)
 
     def wake(self, now: Ns) -> list[Entry]:
@@ -243,11 +251,17 @@ class Watch:
             if waiting.told and waiting.due + LATE_UNTIL <= now:
                 del self._open[pair]
         for number, lane in enumerate(self._lanes):
-            due = _gives_up(lane)
+            due = self._gives_up(lane)
             if due is not None and due <= now:
                 words = "unfinished" if lane.stream.unfinished else "noise"
                 entries += self._given_up(number, words)
         return sorted(entries, key=_time)
+
+    def _gives_up(self, lane: _Lane) -> Ns | None:
+        """When what is pending on a lane is given up; None when nothing is."""
+        if lane.until is None or not lane.stream.pending:
+            return None
+        return lane.until + (self._packet_ends if lane.stream.unfinished else NOISE_ENDS)
 
     def _given_up(self, number: int, words: str) -> list[Entry]:
         event = self._lanes[number].stream.give_up(words)
@@ -291,7 +305,7 @@ class Watch:
 
 
 def _stretch(sent: Sent) -> Stretch:
-    return Stretch(sent.start, sent.end, sent.data, sent.sender, sent.hits)
+    return Stretch(sent.start, sent.end, sent.data, sent.sender, sent.hits, ninth=sent.ninth)
 
 
 def _is_complete(held: Sequence[Sent]) -> bool:
@@ -301,13 +315,6 @@ def _is_complete(held: Sequence[Sent]) -> bool:
         >= len(one.hits)
         for one in held
     )
-
-
-def _gives_up(lane: _Lane) -> Ns | None:
-    """When what is pending on a lane is given up; None when nothing is."""
-    if lane.until is None or not lane.stream.pending:
-        return None
-    return lane.until + (PACKET_ENDS if lane.stream.unfinished else NOISE_ENDS)
 
 
 def _time(entry: Entry) -> Ns:

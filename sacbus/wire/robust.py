@@ -95,10 +95,10 @@ class PacketReceiver:
         """Whether what is pending may yet become a packet or an answer; noise never does."""
         return self._held[:1] == b"\x02"
 
-    def receive(self, data: bytes) -> list[Heard]:
+    def receive(self, data: bytes, _ninth: bytes | None = None) -> list[Heard]:
         """What these bytes complete, in the order of the wire.
 
-        Takes any bytes, split anywhere, and raises nothing.
+        Takes any bytes, split anywhere, and raises nothing. SAC has no use for ninth bits.
         """
         if len(data) == 4 and data[0] == STX and not self._held and data[3] in _ANSWER_ENDINGS:
             # A four-byte answer on its own, which is what mother hears for every packet of hers.
@@ -128,7 +128,7 @@ class PacketReceiver:
             busy = self._receive_exactly(token, events)
         return events
 
-    def locate(self, data: bytes) -> list[tuple[Heard, int, int]]:
+    def locate(self, data: bytes, _ninth: bytes | None = None) -> list[tuple[Heard, int, int]]:
         """As `receive`, each event with the places of its first byte and behind its last.
 
         Places count from the first byte of `data`; those before it are negative. An ending that

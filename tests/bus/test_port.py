@@ -231,6 +231,22 @@ def test_ninth_bits_arrive_with_their_bytes() -> None:
     assert ear.heard[2:] == [(b"\x51", b"\x01"), (b"\x53", b"\x00")]
 
 
+def test_each_byte_may_have_a_ninth_bit_of_its_own() -> None:
+    bus = Bus(Kernel(), Bench().bus.protocol, rate=NINE_BITS)
+    port, ear = Port(bus.medium, lambda _heard, _now: None), NinthBits()
+    bus.medium.listen(0, ear, None)
+    port.talk(b"\x51\x01\x02", b"\x01\x00\x01")
+    bus.kernel.run()
+    assert ear.heard == [(b"\x51\x01\x02", b"\x01\x00\x01")]
+    # A line without ninth bits leaves them out.
+    plain = Bus(Kernel(), Bench().bus.protocol)
+    port, ear = Port(plain.medium, lambda _heard, _now: None), NinthBits()
+    plain.medium.listen(0, ear, None)
+    port.talk(b"\x51\x01", b"\x01\x00")
+    plain.kernel.run()
+    assert ear.heard == [(b"\x51\x01", None)]
+
+
 def test_ninth_bits_of_a_long_run_stay_with_their_bytes() -> None:
     bus = Bus(Kernel(), Bench().bus.protocol, rate=NINE_BITS)
     port, ear = Port(bus.medium, lambda _heard, _now: None), NinthBits()

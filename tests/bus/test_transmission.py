@@ -116,3 +116,28 @@ def test_two_transmissions_that_collide_are_not_spoilt_alike() -> None:
     for one in (first, second):
         one.hit(START, START + RATE.span(len(DATA)))
     assert first.arrived(0, len(DATA), 0) != second.arrived(0, len(DATA), 0)
+
+
+@given(HITS, st.integers(0, 2**32))
+def test_bytes_without_a_stop_bit_are_among_those_that_were_touched(
+    hits: list[tuple[Ns, Ns]], seed: int
+) -> None:
+    sent = transmission()
+    assert sent.framing_errors(0, len(DATA), seed) is None
+    for begin, end in hits:
+        sent.hit(begin, end)
+    framing = sent.framing_errors(0, len(DATA), seed) or bytes(len(DATA))
+    assert {at for at, lacks in enumerate(framing) if lacks} <= set(touched(hits, len(DATA)))
+
+
+def test_half_of_the_touched_bytes_have_no_stop_bit_and_those_sent_without_have_none() -> None:
+    sent = transmission(DATA * 40)
+    sent.hit(START, START + RATE.span(len(sent.data)))
+    framing = sent.framing_errors(0, len(sent.data), 7)
+    assert framing is not None
+    assert 0.4 < sum(framing) / len(framing) < 0.6
+    lacking = transmission()
+    lacking.framing = b"\x01" * len(DATA)
+    assert lacking.framing_errors(2, 5, 0) == b"\x01\x01\x01"
+    lacking.hit(START, START + RATE.span(4))
+    assert lacking.framing_errors(0, len(DATA), 0) == lacking.framing

@@ -15,7 +15,7 @@ def read(data: bytes, of: int, at: int, bits: int = 10, ninth: bytes | None = No
     rate = LineRate(of, bits)
     begins = [rate.span(index) for index in range(len(data))]
     found = resampled(data, ninth, begins, rate, LineRate(at, bits))
-    return [bytes(value for _, value, _ in found), bytes(bit for _, _, bit in found)]
+    return [bytes(value for _, value, _, _ in found), bytes(bit for _, _, bit, _ in found)]
 
 
 @pytest.mark.slow
@@ -62,4 +62,15 @@ def test_bytes_are_read_to_begin_where_their_start_bit_falls() -> None:
     rate = LineRate()
     begins: list[Ns] = [0, SECOND, 2 * SECOND]
     found = resampled(b"abc", None, begins, rate, rate)
-    assert [begin for begin, _, _ in found] == begins
+    assert [begin for begin, *_ in found] == begins
+
+
+def test_a_byte_whose_stop_bit_is_low_is_told() -> None:
+    def framing(data: bytes, of: int, at: int) -> list[int]:
+        rate = LineRate(of)
+        begins = [rate.span(index) for index in range(len(data))]
+        return [lacks for *_, lacks in resampled(data, None, begins, rate, LineRate(at))]
+
+    assert framing(b"abc", 9_600, 9_600) == [0, 0, 0]
+    # A long low has no stop bit.
+    assert framing(b"\x00", 9_600, 38_400) == [1]

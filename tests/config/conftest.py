@@ -29,6 +29,7 @@ def kiln(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "            raise SettingError('logs: expected 0 with fuel = gas')\n"
         "class Smoke:\n"
         "    name, lanes, rate = 'smoke', 2, LineRate(2400, 11)\n"
+        "    addresses = range(4, 256)\n"
         "class Kiln:\n"
         "    name, summary, protocol, settings = 'kiln', 'hot', Smoke(), Settings\n"
         "KIND = Kiln()\n"

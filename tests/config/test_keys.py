@@ -108,16 +108,20 @@ def test_a_file_takes_what_the_daemon_takes(name: str, value: float) -> None:
     assert key.fits(value) is taken
 
 
-@pytest.mark.parametrize("address", [0, 3, 4, 255, 256])
-def test_a_file_takes_the_addresses_that_the_daemon_takes(address: int) -> None:
+@pytest.mark.parametrize(("kind", "addresses"), [("sac", range(4, 256)), ("ss-mst67", range(32))])
+def test_the_daemon_takes_the_addresses_that_a_kinds_protocol_has(
+    kind: str, addresses: range
+) -> None:
     (key,) = [key for key in NODE if key.name == "address"]
-    try:
-        check(Configuration(nodes=(address,)))
-    except SettingError:
-        taken = False
-    else:
-        taken = True
-    assert key.fits(address) is taken
+    for address in range(-1, 257):
+        try:
+            check(Configuration(nodes=(address,), kind=kind))
+        except SettingError:
+            taken = False
+        else:
+            taken = True
+        assert taken is (address in addresses)
+        assert key.fits(address) or not taken
 
 
 def test_the_command_line_takes_the_same_rates() -> None:

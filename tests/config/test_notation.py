@@ -42,15 +42,14 @@ def test_addresses_are_taken_in_the_order_given(text: str, found: tuple[int, ...
         ("10--12", ["expected addresses like 10-19,85, got '10--12'"]),
         ("10,,11", ["expected addresses like 10-19,85, got ''"]),
         ("٣٤", ["expected addresses like 10-19,85, got '٣٤'"]),
-        ("3", ["expected addresses from 4 to 255, low to high, got '3'"]),
-        ("250-256", ["expected addresses from 4 to 255, low to high, got '250-256'"]),
-        ("20-10", ["expected addresses from 4 to 255, low to high, got '20-10'"]),
+        ("250-256", ["expected addresses from 0 to 255, low to high, got '250-256'"]),
+        ("20-10", ["expected addresses from 0 to 255, low to high, got '20-10'"]),
         ("10-12,11-14", ["expected each address once, got 11-12 twice"]),
         (
             "x,10,300,10",
             [
                 "expected addresses like 10-19,85, got 'x'",
-                "expected addresses from 4 to 255, low to high, got '300'",
+                "expected addresses from 0 to 255, low to high, got '300'",
                 "expected each address once, got 10 twice",
             ],
         ),

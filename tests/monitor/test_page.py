@@ -9,10 +9,14 @@ from typing import Any
 import pytest
 from hypothesis import given
 
+from nodes.superstepper import KIND as SUPER_STEPPER
 from sacbus.kernel import MS, SECOND, US, Ns
 from sacbus.monitor.page import JsonPage, TextPage
-from sacbus.watch.entries import Collision, Entry, Lost
+from sacbus.watch.entries import Collision, Entry, Lost, Spoken, Unanswered, concerns
 from sacbus.wire import ack, encode, nak
+from sacbus.wire.superstepper import Answer, Read, encode_answer
+from sacbus.wire.superstepper import encode as encode_message
+from sacbus.wire.superstepper_receivers import AnswerReceiver
 from tests.bus.strategies import bursts
 from tests.watch.rig import M400, Rig
 
@@ -203,3 +207,22 @@ def test_whatever_is_said_has_a_line(data: bytes, verbose: bool) -> None:
     for entry in [*rig.run(5 * SECOND), *rig.watch.end(5 * SECOND)]:
         assert TextPage(verbose=verbose).line(entry).isprintable()
         assert json.loads(JsonPage().line(entry))["event"]
+
+
+def test_a_master_without_an_address_and_a_body_that_is_no_text() -> None:
+    read = SUPER_STEPPER.protocol.decoder().receive(encode_message(0, Read(6)))
+    said = SUPER_STEPPER.protocol.tell(read[0])
+    asked = Spoken(0, MS, None, 0, "master", said, b"\x07\x00\x06")
+    assert TextPage().line(asked).endswith("- -> 0            00 06: read the byte at RAM 0x06")
+    fields = json.loads(JsonPage().line(asked))
+    assert (fields["source"], fields["destination"], fields["body"]) == (None, 0, "00 06")
+    answer = AnswerReceiver().receive(encode_answer(Answer(0, value=7)))
+    said = SUPER_STEPPER.protocol.tell(answer[0])
+    answered = Spoken(MS, 2 * MS, None, 1, "node 0", said, b"", asked, 100 * US)
+    assert TextPage().line(answered).endswith("0 -> -    ok      ACK 7 after 100 us")
+    fields = json.loads(JsonPage().line(answered))
+    assert (fields["source"], fields["destination"]) == (0, None)
+    fields = json.loads(JsonPage().line(Unanswered(MS, asked)))
+    assert (fields["source"], fields["body"]) == (None, "00 06")
+    # Address 0 is a module there, not everybody.
+    assert not concerns(asked, {5})

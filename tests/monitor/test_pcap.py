@@ -18,10 +18,10 @@ from typing import Any
 
 import pytest
 
+from nodes.sac import KIND
 from sacbus.kernel import LineRate
 from sacbus.monitor.pcap import Looked, PcapOutput
 from sacbus.node import Said
-from sacbus.trace.capture import DISSECTOR
 from sacbus.watch import Spoken
 from sacbus.wire import ack, encode
 from sacbus.writer import WAITING
@@ -193,7 +193,16 @@ def test_tshark_reads_along(runtime: Path) -> None:
     port = str(runtime / "port")
     assert TSHARK is not None
     with served("--ephemeral", "--pty", port), started("monitor", "--pcap", "-", port) as monitor:
-        reading = [TSHARK, "-l", "-i", "-", "-X", f"lua_script:{DISSECTOR}", "-c", "2"]
+        reading = [
+            TSHARK,
+            "-l",
+            "-i",
+            "-",
+            "-X",
+            f"lua_script:{KIND.protocol.dissector}",
+            "-c",
+            "2",
+        ]
         ran = subprocess.Popen(
             [*reading, "-T", "fields", "-e", "sac.command", "-e", "sac.response_time"],
             stdin=monitor.process.stdout,

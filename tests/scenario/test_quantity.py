@@ -14,6 +14,7 @@ from sacbus.scenario.quantity import (
     Bounds,
     QuantityError,
     bounds,
+    marked_bytes,
     nanoseconds,
     time_text,
 )
@@ -92,3 +93,21 @@ def test_bounds_are_a_number_a_pair_or_a_limit(
 def test_what_bounds_nothing_is_refused(value: object) -> None:
     with pytest.raises(QuantityError, match="expected a number"):
         bounds(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "data", "ninth"),
+    [
+        ("18 0c", b"\x18\x0c", None),
+        ("^18 0c0f ^1d", b"\x18\x0c\x0f\x1d", b"\x01\x00\x00\x01"),
+        ("55^18", b"\x55\x18", b"\x00\x01"),
+    ],
+)
+def test_bytes_may_have_marks(text: str, data: bytes, ninth: bytes | None) -> None:
+    assert marked_bytes(text) == (data, ninth)
+
+
+@pytest.mark.parametrize("text", ["1", "xx", "^", "18 ^", "^^18"])
+def test_what_is_no_bytes_is_refused(text: str) -> None:
+    with pytest.raises(QuantityError, match="expected bytes in hexadecimal, got"):
+        marked_bytes(text)

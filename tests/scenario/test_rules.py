@@ -132,3 +132,16 @@ def test_a_circle_is_told_of_those_in_it_and_of_nobody_who_waits_for_them() -> N
         Step(Pause(), after="none"),
     )
     assert [line.split(":")[0] for line in told] == [f"steps[{index}].after" for index in (0, 1, 3)]
+
+
+def test_lines_are_for_a_bus_that_speaks_as_mother_does() -> None:
+    bus = Configuration(nodes=(3,), kind="ss-mst67")
+    refuse(Scenario("x", (bus,), (Step(Raw(b"\x1c\x03", ninth=b"\x01\x00")), Step(NodeIs((3,))))))
+    with pytest.raises(ConfigError, match="expected a bus that speaks sac as mother does, got sup"):
+        refuse(Scenario("x", (bus,), (Step(Send(("3m400",), "any")),)))
+
+
+def test_ninth_bits_take_more_than_a_link() -> None:
+    raw = Raw(b"\x1c\x03", ninth=b"\x01\x00")
+    (told,) = refusals(Step(raw), line_only=True)
+    assert "got ninth bits" in told

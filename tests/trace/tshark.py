@@ -11,7 +11,7 @@ from typing import Final
 
 import pytest
 
-from sacbus.trace.capture import DISSECTOR
+from nodes.sac import KIND
 
 __all__ = ["TSHARK", "listed", "needs_tshark", "tshark"]
 
@@ -24,7 +24,7 @@ def tshark(*arguments: str | Path) -> str:
     """What it prints; a Lua error, which it tells and goes on, fails the test."""
     assert TSHARK is not None
     ran = subprocess.run(
-        [TSHARK, "-X", f"lua_script:{DISSECTOR}", *arguments],
+        [TSHARK, "-X", f"lua_script:{KIND.protocol.dissector}", *arguments],
         capture_output=True,
         check=False,
         timeout=60,

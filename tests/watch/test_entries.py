@@ -19,7 +19,9 @@ from sacbus.watch.entries import (
 
 
 def packet(source: int, destination: int, verdict: str = "right") -> Spoken:
-    said = Said("packet", source, destination, b"m400", "move", verdict, 10, 385_000)
+    said = Said(
+        "packet", source, destination, b"m400", "move", verdict, 10, 385_000, destination == 0
+    )
     return Spoken(0, 1, None, 0, None, said, b"")
 
 

@@ -1,0 +1,179 @@
+"""Transactions on a Super Stepper Bus, on a line that is not always good."""
+
+from __future__ import annotations
+
+import pytest
+
+from sacbus.kernel import MS
+from sacbus.mother import BadRequest, LineLost, MotherError
+from sacbus.mother.exchanges import Exchanges
+from sacbus.mother.superstepper import BadChecksum, Nak, NoReply, SuperStepperError
+from sacbus.wire.superstepper import (
+    Answer,
+    Message,
+    Microsteps,
+    MoveSteps,
+    Read,
+    Stop,
+    encode_answer,
+)
+from tests.nodes.superstepper.bench import Bench
+
+Outcome = Answer | MotherError
+
+MOVE = MoveSteps(True, 10_000, 10)
+
+
+class Rig:
+    """A bench, and the master's transactions on its line."""
+
+    def __init__(self, *, nine: bool = False) -> None:
+        self.bench = Bench(3, 4, nine=nine)
+        self.sent: list[tuple[bytes, bytes]] = []
+        #: What happens to the next messages instead of their being sent.
+        self.weather: list[str] = []
+        self.exchanges = Exchanges(self.bench.kernel, self.talk, self.bench.bus.rate)
+        self.bench.port._hear = lambda heard, _now: self.exchanges.hear(heard.data)
+
+    def talk(self, data: bytes, ninth: bytes) -> None:
+        self.sent.append((data, ninth))
+        match self.weather.pop(0) if self.weather else "fine":
+            case "lost":
+                pass
+            case "cut":
+                self.bench.port.talk(data[:-1], ninth[:-1])
+            case "spoilt":
+                self.bench.port.talk(data, ninth)
+                at = self.bench.now + self.bench.span(len(data) + 2)
+                self.bench.kernel.at(at, self.bench.bus.medium.transmit, "noise", b"\x55", 1)
+            case "short":
+                answer = encode_answer(Answer(3))[:3]
+                self.bench.kernel.at(self.bench.now, self.exchanges.hear, answer)
+            case _:
+                self.bench.port.talk(data, ninth)
+
+    def ask(self, address: int, message: Message, **how: bool) -> Outcome:
+        outcomes: list[Outcome] = []
+        self.exchanges.call(address, message, outcomes.append, **how)
+        while not outcomes:
+            assert self.bench.kernel.run_next()
+        (outcome,) = outcomes
+        return outcome
+
+
+@pytest.mark.parametrize("nine", [False, True], ids=["8-bit", "9-bit"])
+def test_a_message_is_answered_and_its_header_is_marked(*, nine: bool) -> None:
+    rig = Rig(nine=nine)
+    assert rig.ask(3, Read(3, word=True)) == Answer(3, value=32_000)
+    assert rig.ask(4, MOVE) == Answer(4)
+    assert [ninth for _, ninth in rig.sent] == [b"\x01\0\0", b"\x01\0\0\0\0\0"]
+
+
+def test_messages_go_out_one_after_the_other() -> None:
+    rig = Rig()
+    outcomes: list[Outcome] = []
+    for address in (3, 4, 3):
+        rig.exchanges.call(address, Read(2), outcomes.append)
+    assert len(rig.sent) == 1
+    rig.bench.run(100 * MS)
+    assert outcomes == [Answer(3, value=10), Answer(4, value=10), Answer(3, value=10)]
+
+
+@pytest.mark.parametrize(
+    ("weather", "error"),
+    [("lost", NoReply), ("cut", Nak), ("spoilt", BadChecksum), ("short", BadChecksum)],
+)
+def test_what_may_run_twice_is_sent_three_times(
+    weather: str, error: type[SuperStepperError]
+) -> None:
+    rig = Rig()
+    rig.weather = [weather] * 2
+    assert rig.ask(3, Read(2)) == Answer(3, value=10)
+    assert len(rig.sent) == 3
+    rig.weather = [weather] * 3
+    failure = rig.ask(3, Read(2))
+    assert type(failure) is error
+    assert failure.attempts == 3
+    assert str(failure).startswith("module 3: 'read the byte at RAM 0x02' sent 3 times: ")
+    # And the line is good again for the next.
+    assert rig.ask(4, Read(2)) == Answer(4, value=10)
+
+
+@pytest.mark.parametrize(("weather", "error"), [("lost", NoReply), ("spoilt", BadChecksum)])
+def test_a_number_of_steps_is_not_sent_again_unless_the_module_has_said_nak(
+    weather: str, error: type[SuperStepperError]
+) -> None:
+    rig = Rig()
+    rig.weather = [weather]
+    failure = rig.ask(3, MOVE)
+    assert type(failure) is error
+    assert "sent once" in str(failure)
+    rig.weather = ["cut", "cut"]
+    assert rig.ask(3, MOVE) == Answer(3)
+    rig.weather = [weather]
+    assert rig.ask(3, MOVE, accept_duplicates=True) == Answer(3)
+
+
+def test_anothers_answer_is_none() -> None:
+    rig = Rig()
+    rig.exchanges.hear(b"\x01\x02")
+    assert rig.exchanges.strays == 2
+    rig.weather = ["lost"]
+    outcomes: list[Outcome] = []
+    rig.exchanges.call(3, MOVE, outcomes.append)
+    rig.exchanges.hear(encode_answer(Answer(4)))
+    assert type(outcomes[0]) is BadChecksum
+
+
+def test_a_line_that_is_lost_fails_what_waits_and_what_comes() -> None:
+    rig = Rig()
+    outcomes: list[Outcome] = []
+    rig.exchanges.call(3, Read(2), outcomes.append)
+    rig.exchanges.call(4, Read(2), outcomes.append)
+    rig.exchanges.lose("the line is gone")
+    rig.exchanges.call(4, Read(2), outcomes.append)
+    assert [type(one) for one in outcomes] == [LineLost] * 3
+    rig.bench.run(100 * MS)
+    assert len(outcomes) == 3
+
+
+def test_what_nobody_waits_for_any_more_is_not_sent() -> None:
+    rig = Rig()
+    rig.weather = ["lost"]
+    outcomes: list[list[Outcome]] = [[], []]
+    done = [one.append for one in outcomes]
+    for one in done:
+        rig.exchanges.call(3, Read(2), one)
+    for one in done:
+        rig.exchanges.withdraw(one)
+    rig.bench.run(200 * MS)
+    assert len(rig.sent) == 1
+    assert rig.ask(3, Read(2)) == Answer(3, value=10)
+
+
+def test_while_bytes_wait_for_the_line_no_answer_is_late() -> None:
+    bench = Bench(3)
+    waiting = [1] * 3
+    exchanges = Exchanges(
+        bench.kernel,
+        lambda *_: None,
+        bench.bus.rate,
+        unsent=lambda: waiting.pop() if waiting else 0,
+    )
+    outcomes: list[Outcome] = []
+    exchanges.call(3, MOVE, outcomes.append)
+    begin = bench.now
+    while not outcomes:
+        bench.kernel.run_next()
+    once = bench.span(11) + bench.span(10) + 10 * MS
+    assert bench.now - begin == 4 * once
+
+
+@pytest.mark.parametrize(
+    ("address", "message"), [(32, Stop()), (3, MoveSteps(True, 1, 70_000)), (3, Microsteps(9))]
+)
+def test_what_cannot_be_sent_is_refused_at_once(address: int, message: Message) -> None:
+    rig = Rig()
+    with pytest.raises(BadRequest, match=f"module {address}: "):
+        rig.exchanges.call(address, message, lambda _: None)
+    assert not rig.sent

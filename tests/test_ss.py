@@ -1,0 +1,94 @@
+"""``sacbus ss`` in a process of its own, against modules that ``sacbus serve`` hosts."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from tests.serving import served
+
+pytestmark = pytest.mark.slow
+
+
+def ss(*arguments: str) -> tuple[int, str, str]:
+    """Its exit status, and what it said."""
+    ran = subprocess.run(
+        [sys.executable, "-m", "sacbus", "ss", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    return ran.returncode, ran.stdout.strip(), ran.stderr.strip()
+
+
+@pytest.fixture(scope="module")
+def link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    port = str(tmp_path_factory.mktemp("ss") / "steppers")
+    with served("--ephemeral", "--kind", "ss-mst67", "--nodes", "0-3", "--pty", port):
+        yield port
+
+
+def test_a_session_from_move_to_stop(link: str) -> None:
+    assert ss(link, "3", "microsteps", "8", "--decay", "slow") == (0, "ACK", "")
+    assert ss(link, "3", "move-at-speed", "4000", "--at-once", "--ccw") == (0, "ACK", "")
+    assert ss(link, "3", "status") == (0, "busy", "")
+    status, said, _ = ss(link, "3", "steps-run", "--json")
+    report = json.loads(said)
+    assert (status, report["outcome"], report["module"]) == (0, "ack", 3)
+    assert report["value"] > 0
+    assert ss(link, "3", "change-speed", "8000") == (0, "ACK", "")
+    assert ss(link, "3", "stop", "--at-once", "--off") == (0, "ACK", "")
+    assert ss(link, "3", "status") == (0, "at rest", "")
+
+
+def test_memories_are_written_and_read(link: str) -> None:
+    assert ss(link, "2", "write", "0x10", "66")[0] == 0
+    assert ss(link, "2", "read", "0x10") == (0, "66 (0x42)", "")
+    assert ss(link, "2", "read", "3", "--word") == (0, "32000 (0x7d00)", "")
+    assert ss(link, "2", "read", "1", "--eeprom") == (0, "2 (0x02)", "")
+    assert ss(link, "1", "home", "--speed", "4000", "--most", "2")[0] == 0
+    assert ss(link, "1", "move-steps", "0", "--speed", "4000", "--rate", "slow")[0] == 0
+
+
+def test_silence_is_told_with_its_own_status(link: str) -> None:
+    status, said, error = ss("--json", link, "9", "status")
+    assert status == 4
+    assert json.loads(said) == {
+        "module": 9,
+        "message": "read the byte at RAM 0x06",
+        "outcome": "no answer",
+        "attempts": 3,
+    }
+    assert error.startswith("error: module 9: 'read the byte at RAM 0x06' sent 3 times: no answer")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "told"),
+    [
+        (("32", "status"), 2, "32 is not in the range 0<=x<=31"),
+        (("3", "read", "256"), 2, "expected a number from 0 to 255, got '256'"),
+        (("3", "read", "x"), 2, "expected a number from 0 to 255, got 'x'"),
+        (("3", "read", "0", "--word", "--eeprom"), 2, "leave --word or --eeprom out"),
+        (("3", "microsteps", "3"), 2, "'3' is not one of"),
+        (("3", "move-steps", "5"), 2, "Missing option '--speed'"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(
+    arguments: tuple[str, ...], status: int, told: str, link: str
+) -> None:
+    ended, said, error = ss(link, *arguments)
+    assert (ended, said) == (status, "")
+    assert told in error
+    assert error.count("\n") == 0
+
+
+def test_a_line_that_cannot_be_had_is_told(link: str) -> None:
+    status, _, error = ss("/no/such/port", "3", "status")
+    assert status == 1
+    assert error.startswith("error: cannot open the line (no such file), /no/such/port")
+    assert ss("--nine", link, "3", "status")[2].startswith("error: no ninth bits there")
