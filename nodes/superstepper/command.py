@@ -155,6 +155,12 @@ class CommandProcessor:
             self._off_after = False
             self.enabled = False
 
+    def emergency(self, now: Ns) -> None:
+        """No step follows; the driver's current stays as it is, or as it was to be in the end."""
+        self.enabled &= not self._off_after
+        self._off_after = False
+        self._halt(now)
+
     def home_falls(self, now: Ns) -> None:
         """The home sensor's input has fallen."""
         move = self._move
@@ -175,18 +181,12 @@ class CommandProcessor:
         self._off_after = False
         self.enabled = True
         self._run_from = self.engine.steps(now)
-        rate = command.rate
-        if rate is Rate.NONE:
+        if command.rate is Rate.NONE:
             self._halt(now)
             self._owner.tell(
                 ReportKind.WARNING, "rate 3 divides the timer by nothing: the motor does not move"
             )
             return False
-        if 0 < command.speed < rate.least:
-            self._owner.tell(
-                ReportKind.WARNING,
-                f"speed {command.speed} is below the {rate.least} that its rate allows",
-            )
         return True
 
     def _move_at_speed(self, command: MoveAtSpeed, now: Ns) -> None:
@@ -225,6 +225,11 @@ class CommandProcessor:
         """``ramps``: whatever its accelerate bit says."""
         profile = self._profile()
         command = move.command
+        least = command.rate.least
+        if move.value < least:
+            self._owner.tell(
+                ReportKind.WARNING, f"speed {move.value} is below the {least} that its rate allows"
+            )
         before = 0
 
         def plan(entry: Entry | None) -> Sequence[Stretch]:

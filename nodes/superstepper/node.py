@@ -18,7 +18,7 @@ from nodes.superstepper.pins import SuperStepperPins
 from nodes.superstepper.settings import SuperStepperSettings
 from sacbus.kernel import US, LineRate, Ns
 from sacbus.node import OFF, Heard, Report, ReportKind, Snapshot
-from sacbus.wire.superstepper import Message, Stop, describe
+from sacbus.wire.superstepper import Message, describe
 
 __all__ = ["SuperStepperNode"]
 
@@ -200,10 +200,10 @@ class SuperStepperNode:
         )
 
     def stop(self, now: Ns) -> None:
-        """Stop as by opcode 4 without deceleration: no further step; the current stays on."""
+        """No further step, as by opcode 4 without deceleration; a driver that is off stays off."""
         self.now = now
         if self.powered:
-            self._commands.execute(Stop(decelerate=False, enabled=True), now)
+            self._commands.emergency(now)
         self.look(now)
 
     def power(self, *, on: bool, now: Ns) -> None:

@@ -110,6 +110,26 @@ def test_a_speed_below_table_2_is_obeyed_with_a_warning(rate: Rate, speed: int) 
     assert len(bench.bus.reports) == 1
 
 
+def test_a_change_to_a_speed_below_table_2_warns_when_it_is_used() -> None:
+    bench = Bench(3)
+    bench.execute(ChangeSpeed(99))
+    assert not bench.bus.reports
+    bench.execute(at_once(4_000))
+    bench.execute(ChangeSpeed(100))
+    assert len(bench.bus.reports) == 1
+    bench.execute(ChangeSpeed(98))
+    assert [one.text for one in bench.bus.reports] == [
+        f"speed {speed} is below the 100 that its rate allows" for speed in (99, 98)
+    ]
+
+
+def test_a_speed_below_table_2_that_is_not_used_does_not_warn() -> None:
+    bench = Bench(3)
+    bench.execute(ChangeSpeed(8_000))
+    bench.execute(at_once(99))
+    assert not bench.bus.reports
+
+
 # ---- op 0 ----
 
 

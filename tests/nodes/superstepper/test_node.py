@@ -19,7 +19,7 @@ from sacbus.node import (
     find_protocol,
     settings_from,
 )
-from sacbus.wire.superstepper import MoveAtSpeed, Read, Write, encode
+from sacbus.wire.superstepper import MoveAtSpeed, Read, Stop, Write, encode
 from tests.nodes.superstepper.bench import Bench
 
 #: Table 6, and the error of 4 MHz / 16 / (code + 1), in per cent.
@@ -220,6 +220,21 @@ def test_in_an_emergency_no_step_follows() -> None:
     bench.node.power(on=False, now=bench.now)
     bench.node.stop(bench.now)
     assert bench.node.state(bench.now) == "OFF"
+
+
+@pytest.mark.parametrize("decelerate", [False, True])
+def test_an_emergency_switches_no_driver_on(*, decelerate: bool) -> None:
+    bench = Bench(3)
+    bench.execute(MoveAtSpeed(True, 4_000, accelerate=False))
+    bench.run(SECOND)
+    bench.execute(Stop(decelerate=decelerate, enabled=False))
+    bench.node.stop(bench.now)
+    assert bench.node.pins.level("enable", bench.now) == 0
+    bench.run(SECOND)
+    assert bench.node.snapshot(bench.now).position_pulses == 500
+    bench.execute(MoveAtSpeed(True, 4_000, accelerate=False))
+    bench.run(SECOND)
+    assert bench.node.pins.level("enable", bench.now) == 1
 
 
 def test_pins_that_it_does_not_have_are_refused() -> None:
