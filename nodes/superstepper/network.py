@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Final, Protocol
 
-from sacbus.kernel import MS, LineRate, Ns
+from sacbus.kernel import LineRate, Ns
 from sacbus.node import Heard, ReportKind
 from sacbus.wire.superstepper import (
     ANSWER_SIZE,
@@ -28,21 +28,13 @@ from sacbus.wire.superstepper import (
     decode,
     encode_answer,
     opcode_of,
+    patience,
 )
 
-__all__ = ["NetworkPort", "PortOwner", "patience"]
-
-#: Byte times, and ns at least, after which a message that has not come whole is given up [D].
-_BYTES_OF_SILENCE: Final = 10
-_LEAST_SILENCE: Final[Ns] = 5 * MS
+__all__ = ["NetworkPort", "PortOwner"]
 
 #: Bytes that a UART holds that nobody reads.
 _HELD: Final = 2
-
-
-def patience(byte: Ns) -> Ns:
-    """Silence that ends a message, where a byte takes so long."""
-    return max(_BYTES_OF_SILENCE * byte, _LEAST_SILENCE)
 
 
 class PortOwner(Protocol):

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from nodes.superstepper.network import patience
 from sacbus.kernel import US, LineRate, Ns
 from sacbus.node import EVERYONE, MASTER, Decoder, Said
-from sacbus.wire.superstepper import ADDRESSES, ANSWER_SIZE, Answer, describe
+from sacbus.wire.superstepper import ADDRESSES, ANSWER_SIZE, Answer, describe, patience
 from sacbus.wire.superstepper_receivers import (
     Acknowledged,
     AnswerReceiver,
@@ -84,12 +83,7 @@ def _words(answer: Answer) -> str:
     words = "ACK" if answer.positive else "NAK"
     if answer.value:
         words += f" {answer.value}"
-    flags = [
-        name
-        for name, told in (("framing error", answer.framing), ("overrun", answer.overrun))
-        if told
-    ]
-    return f"{words} ({', '.join(flags)})" if flags else words
+    return f"{words} ({', '.join(answer.flags)})" if answer.flags else words
 
 
 EIGHT_BITS: Final = SuperStepperProtocol("superstepper", 8)

@@ -253,12 +253,7 @@ def _exchange(line: dict[str, Any], message: Message, show: _Shown) -> int:
         }
         click.echo(json.dumps(report | fields))
         return 0
-    flags = [
-        name
-        for name, told in (("framing error", answer.framing), ("overrun", answer.overrun))
-        if told
-    ]
-    click.echo(words + (f" (it has seen: {', '.join(flags)})" if flags else ""))
+    click.echo(words + (f" (it has seen: {', '.join(answer.flags)})" if answer.flags else ""))
     return 0
 
 

@@ -32,6 +32,7 @@ from sacbus.wire.superstepper import (
     decode_answer,
     describe,
     encode,
+    patience,
 )
 
 __all__ = [
@@ -47,11 +48,6 @@ __all__ = [
 #: How late an answer may be beyond the line's own figures, on a line in this process; it covers the
 #: turnaround, of which nothing is published.
 SLACK: Final[Ns] = 10 * MS
-
-#: A module gives up a message after 10 byte times, at least 5 ms (spec, [D]); a master waits as
-#: long before she says the next one where the last did not go well.
-_PATIENCE_BYTES: Final = 10
-_PATIENCE: Final[Ns] = 5 * MS
 
 #: Attempts for what may be repeated.
 TRIES: Final = 3
@@ -105,6 +101,7 @@ class _Request:
     done: Done
     may_repeat: bool
     attempts: int = 0
+    withdrawn: bool = False
 
 
 class Exchanges:
@@ -128,7 +125,8 @@ class Exchanges:
         self._rate = rate
         self._slack = slack
         self._unsent = unsent
-        self._patience = max(rate.span(_PATIENCE_BYTES), _PATIENCE)
+        #: She waits as long before the next message as modules do, where the last went wrong.
+        self._patience = patience(rate.span(1))
         self._waiting: deque[_Request] = deque()
         self._outstanding: _Request | None = None
         self._heard = bytearray()
@@ -167,7 +165,7 @@ class Exchanges:
         """Nobody waits any more for the message of this ``done``: it is not sent any more."""
         self._waiting = deque(one for one in self._waiting if one.done != done)
         if self._outstanding is not None and self._outstanding.done == done:
-            self._outstanding.may_repeat = False
+            self._outstanding.withdrawn = True
 
     def hear(self, data: bytes) -> None:
         """Bytes from the modules."""
@@ -231,7 +229,8 @@ class Exchanges:
         self, request: _Request, kind: type[SuperStepperError], *, may_repeat: bool = False
     ) -> None:
         self._outstanding = None
-        if (may_repeat or request.may_repeat) and request.attempts < TRIES:
+        may_repeat = (may_repeat or request.may_repeat) and not request.withdrawn
+        if may_repeat and request.attempts < TRIES:
             self._waiting.appendleft(request)
         else:
             request.done(kind(request.address, request.message, request.attempts))

@@ -43,6 +43,7 @@ __all__ = [
     "encode",
     "encode_answer",
     "opcode_of",
+    "patience",
 ]
 
 #: Five bits of address.
@@ -233,6 +234,12 @@ class Answer:
     framing: bool = False
     overrun: bool = False
 
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What ``framing`` and ``overrun`` tell, in words."""
+        told = ("framing error",) if self.framing else ()
+        return (*told, "overrun") if self.overrun else told
+
 
 class Status(NamedTuple):
     """RAM 6. ``home_complete``: the last move ended at the home sensor."""
@@ -258,6 +265,16 @@ def decode_status(byte: int) -> Status:
         bool(_STATUS_HOME.get(byte)),
         bool(_STATUS_CHANGING.get(byte)),
     )
+
+
+#: Byte times, and ns at least, after which a message that has not come whole is given up [D].
+_PATIENCE_BYTES: Final = 10
+_PATIENCE_NS: Final = 5_000_000
+
+
+def patience(byte_ns: int) -> int:
+    """Silence, in ns, that ends a message, where a byte takes ``byte_ns``."""
+    return max(_PATIENCE_BYTES * byte_ns, _PATIENCE_NS)
 
 
 def address_of(header: int) -> int:

@@ -16,6 +16,7 @@ from sacbus.wire.superstepper import (
     Read,
     Stop,
     encode_answer,
+    patience,
 )
 from tests.nodes.superstepper.bench import Bench
 
@@ -151,6 +152,18 @@ def test_what_nobody_waits_for_any_more_is_not_sent() -> None:
     assert rig.ask(3, Read(2)) == Answer(3, value=10)
 
 
+def test_what_nobody_waits_for_any_more_is_not_sent_again_after_a_nak_either() -> None:
+    rig = Rig()
+    rig.weather = ["cut"]
+    outcomes: list[Outcome] = []
+    done = outcomes.append
+    rig.exchanges.call(3, MOVE, done)
+    rig.exchanges.withdraw(done)
+    rig.bench.run(200 * MS)
+    assert len(rig.sent) == 1
+    assert [type(one) for one in outcomes] == [Nak]
+
+
 def test_while_bytes_wait_for_the_line_no_answer_is_late() -> None:
     bench = Bench(3)
     waiting = [1] * 3
@@ -165,7 +178,7 @@ def test_while_bytes_wait_for_the_line_no_answer_is_late() -> None:
     begin = bench.now
     while not outcomes:
         bench.kernel.run_next()
-    once = bench.span(11) + bench.span(10) + 10 * MS
+    once = bench.span(11) + patience(bench.span(1)) + 10 * MS
     assert bench.now - begin == 4 * once
 
 

@@ -30,6 +30,7 @@ from sacbus.wire.superstepper import (
     encode,
     encode_answer,
     opcode_of,
+    patience,
 )
 
 _WORDS = st.integers(0, 0xFFFF)
@@ -148,6 +149,24 @@ def test_answers_have_a_checksum(answer: Answer, data: str) -> None:
         wrong[place] ^= 1
         assert decode_answer(bytes(wrong)) is None
     assert decode_answer(bytes.fromhex(data)[:4]) is None
+
+
+@pytest.mark.parametrize(
+    ("answer", "flags"),
+    [
+        (Answer(3), ()),
+        (Answer(3, framing=True), ("framing error",)),
+        (Answer(3, overrun=True), ("overrun",)),
+        (Answer(3, framing=True, overrun=True), ("framing error", "overrun")),
+    ],
+)
+def test_the_flags_of_an_answer_are_told_in_words(answer: Answer, flags: tuple[str, ...]) -> None:
+    assert answer.flags == flags
+
+
+@pytest.mark.parametrize(("byte_ns", "ns"), [(1_041_667, 10_416_670), (86_806, 5_000_000)])
+def test_a_message_has_ten_byte_times_and_at_least_5_ms(byte_ns: int, ns: int) -> None:
+    assert patience(byte_ns) == ns
 
 
 def test_the_status_register_has_three_bits() -> None:
