@@ -17,7 +17,7 @@ from nodes.superstepper.command import CommandProcessor
 from nodes.superstepper.course import ACCEL, CRUISE, DECEL, Course, Stretch
 from nodes.superstepper.engine import EIGHTHS, Engine, Standing
 from nodes.superstepper.pins import TOLD, levels_of
-from nodes.superstepper.ramp import Pace, ramp
+from nodes.superstepper.ramp import TICKS_PER_MS, Pace, ramp
 from sacbus.kernel import Ns
 from sacbus.motion import Timebase
 from sacbus.movement import Watcher
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 __all__ = ["Moving", "Shape", "SuperStepperMovement", "SuperStepperSegment"]
 
 _STANDBY: Final = "STANDBY"
+
+#: The largest divider, and the longest beat: a time base of 255 (``Rate``, ``Pace``).
+_DIVIDER: Final = 64
+_BEAT: Final = 256 * TICKS_PER_MS
 
 #: The last tick that is looked at: 292 years of them are enough, and fit int64 with what is added.
 _LAST: Final = 1 << 61
@@ -159,13 +163,13 @@ def _stretch(stored: Sequence[Any]) -> Stretch:
     state, sign, value, divider, periods, *up = stored
     if state not in (ACCEL, CRUISE, DECEL) or sign not in (1, -1):
         raise ValueError(stored)
-    value, divider = _whole(value, 1, FULL_SPEED), _whole(divider, 1)
+    value, divider = _whole(value, 1, FULL_SPEED), _whole(divider, 1, _DIVIDER)
     if periods is not None:
         _whole(periods, 0)
     if not up:
         return Stretch(state, sign, value, divider, periods)
     ((slow, fast, rate, beat, backwards),) = up
-    pace = Pace(_whole(rate, 0), _whole(beat, 1))
+    pace = Pace(_whole(rate, 0, FULL_SPEED), _whole(beat, 1, _BEAT))
     found = ramp(_whole(slow, 1, FULL_SPEED), _whole(fast, 1, FULL_SPEED), pace, divider)
     if _whole(periods, 0) > found.periods:
         raise ValueError(stored)
@@ -193,13 +197,16 @@ class SuperStepperSegment:
         pulses, eighths = values["rest"]
         exponent = Microsteps.of(board.ms_decay).exponent
         anchor = 0 if shape.course is None else values["anchor"]
+        sign = values["sign"]
+        if sign not in (1, -1):
+            raise ValueError(sign)
         self._engine = Engine.of(
             Standing(
                 board.clock,
                 _whole(pulses, -_LAST),
                 _whole(eighths, -_LAST),
                 EIGHTHS >> exponent,
-                values["sign"],
+                sign,
                 shape.course,
                 _whole(anchor, 0),
             )

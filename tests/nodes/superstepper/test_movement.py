@@ -144,11 +144,13 @@ RIGHT = {
         {"course": [["CRUISE", 0, 100, 1, 3]]},
         {"course": [["CRUISE", 1, 0, 1, 3]]},
         {"course": [["CRUISE", 1, 100, 0, 3]]},
+        {"course": [["CRUISE", 1, 100, 65, 3]]},
         {"course": [["CRUISE", 1, 100, 1, -3]]},
         {"course": [["CRUISE", 1, 100]]},
         {"course": [["ACCEL", 1, 100, 1, None, [32_000, 10_000, 256, 44_000, False]]]},
         {"course": [["ACCEL", 1, 100, 1, 9_999, [32_000, 10_000, 256, 44_000, False]]]},
         {"course": [["ACCEL", 1, 100, 1, 3, [32_000, 10_000, 256, 0, False]]]},
+        {"course": [["ACCEL", 1, 100, 1, 3, [32_000, 10_000, 1, 1 << 60, False]]]},
         {"course": [["ACCEL", 1, 100, 1, 3, [32_000, 10_000, 256]]]},
     ],
 )
@@ -158,6 +160,14 @@ def test_what_no_module_tells_is_refused(wrong: dict[str, object]) -> None:
         Shape({**RIGHT, **wrong})
     with pytest.raises((LookupError, TypeError, ValueError)):
         KIND.segment(0, Shape(RIGHT), {"rest": [0, 0], "sign": 1})
+
+
+@pytest.mark.parametrize("wrong", [{"sign": 0}, {"sign": "x"}, {"rest": [0]}, {"anchor": -1}])
+def test_a_place_in_a_motion_that_no_module_tells_is_refused(wrong: dict[str, object]) -> None:
+    right: dict[str, object] = {"rest": [0, 0], "sign": 1, "anchor": 0}
+    assert KIND.segment(0, Shape(RIGHT), right).started is not None
+    with pytest.raises((LookupError, TypeError, ValueError)):
+        KIND.segment(0, Shape(RIGHT), {**right, **wrong})
 
 
 @pytest.mark.parametrize("nine", [False, True], ids=["8-bit", "9-bit"])
