@@ -280,6 +280,8 @@ def test_a_recording_that_was_cut_off_is_told(recording: Path, capsys: Captured)
         (["encode", "{steps}", "--axes", "left:4"], "expected numbers as in {steps}, which has no"),
         (["encode", "{steps}", "--vcd", "{out}", "--pins"], "--pins: expected a scenario or a"),
         (["encode", "{none}.csv"], "{none}.csv: No such file or directory, name a file of steps"),
+        (["encode", "{none}.csv", "--axes", "4"], "{none}.csv: No such file or directory, name a"),
+        (["encode", "{none}.npy", "--axes", "4"], "{none}.npy: No such file or directory, name a"),
         (["encode", "{none}.jsonl"], "{none}.jsonl: No such file or directory, name a recording"),
         (["encode", "{empty}"], "{empty}: expected steps, got none"),
         (["encode", "{toml}"], "{toml}: expected one case, got 2, use --set"),

@@ -158,7 +158,8 @@ def _of_steps(path: Path, axes: Sequence[AxisName]) -> Source:
     if of_bus is not None:
         raise click.UsageError(f"--axes: {of_bus}: expected numbers as in {path}, which has no bus")
     try:
-        numbers = tuple(axis.number for axis in axes) or axes_in(path)
+        with path.open("rb"):  # that it can be read is found out here, not in mid stream
+            numbers = tuple(axis.number for axis in axes) or axes_in(path)
     except OSError as fault:
         raise WrongInput(f"{path}: {fault.strerror}, name a file of steps") from fault
     if not numbers:

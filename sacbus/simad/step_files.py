@@ -29,6 +29,9 @@ FORMS: Final = (".csv", ".npy")
 #: Steps that are read or written at a time.
 PIECE: Final = 1 << 17
 
+#: Of what is counted here, int64.
+_LARGEST: Final = (1 << 63) - 1
+
 _STORED: Final = np.dtype([("time_ns", "<i8"), ("axis", "<i4"), ("direction", "i1")])
 
 
@@ -109,7 +112,7 @@ def _columns(path: Path) -> Iterator[_Columns]:
 def _of_array(path: Path) -> Iterator[_Columns]:
     try:
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except ValueError as fault:
+    except (EOFError, ValueError) as fault:  # EOFError: there is nothing in it
         raise SimadError(f"{path}: expected an array of numpy's, {fault}") from fault
     names = array.dtype.names
     if array.ndim == 1 and names is not None and set(FIELDS) <= set(names):
@@ -124,8 +127,11 @@ def _of_array(path: Path) -> Iterator[_Columns]:
     if any(part.dtype.kind not in "iu" for part in parts):
         raise SimadError(f"{path}: expected whole numbers, got {array.dtype}")
     for first in range(0, len(array), PIECE):
-        times, axes, ways = (part[first : first + PIECE].astype(np.int64) for part in parts)
-        yield _Columns(times, axes, ways, first)
+        pieces = [part[first : first + PIECE] for part in parts]
+        for piece in pieces:
+            if int(piece.max()) > _LARGEST:
+                raise SimadError(f"{path}: expected numbers below 2**63, got {piece.max()}")
+        yield _Columns(*(piece.astype(np.int64) for piece in pieces), first)
 
 
 def _of_lines(path: Path, file: TextIO) -> Iterator[_Columns]:
@@ -153,7 +159,7 @@ def _one_by_one(path: Path, rows: Sequence[str], number: int) -> Times:
             values = [int(word) for word in row.split(",")]
         except ValueError:
             values = []
-        if len(values) != len(FIELDS) or any(abs(value) >= 1 << 63 for value in values):
+        if len(values) != len(FIELDS) or any(abs(value) > _LARGEST for value in values):
             raise SimadError(
                 f"{path}, line {line}: expected {','.join(FIELDS)} as whole numbers, "
                 f"got {row.strip()[:40]!r}"

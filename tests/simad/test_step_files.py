@@ -106,6 +106,10 @@ def test_a_line_that_is_wrong_is_named(tmp_path: Path, text: str, told: str) -> 
         (np.zeros(3), "expected fields time_ns, axis, direction or three columns, got float64"),
         (np.zeros((3, 3)), "expected whole numbers, got float64"),
         (np.zeros((3, 3), dtype=int), "row 0: expected a direction of 1 or -1, got 0"),
+        (
+            np.full((1, 3), 1 << 63, dtype=np.uint64),
+            r"expected numbers below 2\*\*63, got 9223372036854775808",
+        ),
     ],
 )
 def test_an_array_that_is_wrong_is_refused(tmp_path: Path, array: object, told: str) -> None:
@@ -115,9 +119,10 @@ def test_an_array_that_is_wrong_is_refused(tmp_path: Path, array: object, told: 
         joined([*read_steps(path, (1,))])
 
 
-def test_what_is_no_array_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("text", ["5,1,1\n", ""], ids=["CSV", "nothing"])
+def test_what_is_no_array_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "steps.npy"
-    path.write_text("5,1,1\n")
+    path.write_text(text)
     with pytest.raises(SimadError, match="expected an array of numpy's"):
         axes_in(path)
 
