@@ -43,6 +43,7 @@ def scan_command(link: str, nodes: tuple[int, ...], baud: int, as_json: bool) ->
     """
     if not nodes:
         raise click.BadParameter("expected addresses like 10-19,85", param_hint="--nodes")
+    _check(nodes)
     found = asyncio.run(_scan(link, nodes, baud))
     if as_json:
         rows = [
@@ -64,6 +65,18 @@ def scan_command(link: str, nodes: tuple[int, ...], baud: int, as_json: bool) ->
         err=True,
     )
     return NO_ANSWER_STATUS
+
+
+def _check(nodes: tuple[int, ...]) -> None:
+    """Refuse, before a line is opened, addresses that mother cannot ask."""
+    from sacbus.mother import BadRequest
+    from sacbus.mother.request import checked_address
+
+    try:
+        for node in nodes:
+            checked_address(node)
+    except BadRequest as fault:
+        raise click.BadParameter(str(fault), param_hint="--nodes") from fault
 
 
 async def _scan(link: str, nodes: tuple[int, ...], baud: int) -> list[Acknowledged]:
