@@ -19,7 +19,8 @@ from sacbus.host import Host, VirtualHost
 from sacbus.kernel import SECOND, Ns
 from sacbus.links import Link, TellingLink, Tuning
 from sacbus.links.link import Server
-from sacbus.mother import Mother
+from sacbus.mother import BadRequest, Mother
+from sacbus.mother.request import SPEAKS
 from sacbus.node import BOOT, Heard, Node, Report, ReportKind, Snapshot
 from sacbus.panel import Deed, Panel
 from sacbus.saving import AtOnce, Saving, Soon
@@ -269,7 +270,16 @@ class HostedBus:
         return port
 
     def mother(self) -> Mother:
-        """Mother on this very bus, at no distance from the line."""
+        """Mother on this very bus, at no distance from the line.
+
+        BadRequest where another protocol than hers is spoken: her bytes mean something else there.
+        """
+        spoken = self.bus.protocol.name
+        if spoken != SPEAKS:
+            raise BadRequest(
+                f"bus {self.bus.name}: mother speaks {SPEAKS}, expected a bus that does, got "
+                f"{spoken}, take a master of that protocol"
+            )
 
         def hear(data: bytes) -> None:
             mother.hear(data)

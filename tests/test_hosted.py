@@ -10,7 +10,7 @@ from sacbus.bus import Babble, Dead, Drop, FaultError
 from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.host import run_virtual
 from sacbus.kernel import MS, Kernel
-from sacbus.mother import MotherError
+from sacbus.mother import BadRequest, MotherError
 from sacbus.selector import real_loop
 
 
@@ -41,6 +41,17 @@ def test_a_fault_is_put_on_and_taken_off_in_real_time() -> None:
     with asyncio.Runner(loop_factory=real_loop) as runner:
         # A machine that is late has mother try again the first line as well.
         assert runner.run(_scene()) >= 3
+
+
+@pytest.mark.asyncio
+async def test_mother_speaks_to_no_bus_of_another_protocol() -> None:
+    async with open_bus(Configuration(nodes=(3,), kind="ss-mst67", name="table")) as bus:
+        with pytest.raises(BadRequest) as refused:
+            bus.mother()
+    assert str(refused.value) == (
+        "bus table: mother speaks sac, expected a bus that does, got superstepper, take a master "
+        "of that protocol"
+    )
 
 
 @pytest.mark.slow

@@ -22,7 +22,8 @@ def estop_command(link: str, baud: int, as_json: bool) -> int:
 
     LINK is the path of a serial port or of a bus's pty, socket://host:port or rfc2217://host:port.
     Nobody answers a broadcast: status 0 says that it was sent. It is no substitute for a switch
-    that takes the power away.
+    that takes the power away. It speaks SAC: on a line of another protocol its bytes mean
+    something else, and need stop nothing.
 
     \b
     Example: sacbus estop /tmp/sacbus

@@ -76,7 +76,7 @@ def ss_group(context: click.Context, /, **_given: object) -> None:
     """Send a message to an SS-MST67 module as master, and wait for its acknowledge.
 
     LINK is the path of a serial port or of a bus's pty, socket://host:port or rfc2217://host:port.
-    Status: 0 acknowledged, 3 NAK, 4 no answer, 5 a damaged answer.
+    Status: 0 acknowledged, 3 NAK, 4 no answer, 5 a damaged answer, or another's.
 
     \b
     Example: sacbus ss /tmp/steppers 3 move-steps 400 --speed 10000

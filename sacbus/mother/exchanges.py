@@ -81,7 +81,10 @@ class NoReply(SuperStepperError, TimeoutError):
 class BadChecksum(SuperStepperError):
     """Something came, but its checksum is wrong, or it is another's answer."""
 
-    verdict = "a damaged answer; it was probably executed, look at the module"
+    verdict = (
+        "a damaged answer, or another module's; it was probably executed, look at the module, and "
+        "check the mode (8 or 9 bits)"
+    )
 
 
 class Talk(Contract):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from sacbus.kernel import MS, US
 from sacbus.node import ReportKind
+from sacbus.wire import packets
 from sacbus.wire.superstepper import Answer, MoveAtSpeed, Read, decode_answer, encode
 from tests.nodes.superstepper.bench import Bench, Said
 
@@ -122,6 +123,14 @@ def test_in_8_bit_mode_a_lost_byte_shifts_everything_until_the_time_out() -> Non
     assert course == MoveAtSpeed(clockwise=True, speed=0x0F1F, accelerate=False)
     # 00 02 begin a message for address 0: nobody's, and over after its time-out.
     assert bench.exchange("1f 00 02") == "83 00 00 0a 8d"
+
+
+def test_an_emergency_stop_of_sacs_is_another_message_here() -> None:
+    bench = Bench(0)
+    bench.execute(MoveAtSpeed(True, 4_000, accelerate=False))
+    bench.exchange(packets.encode(packets.GENERAL_CALL, packets.MOTHER, b"S").hex())
+    assert bench.node.commands.status(bench.now).changing_speed
+    assert bench.bus.reports[0].text == "speed 1 is below the 100 that its rate allows"
 
 
 def test_in_9_bit_mode_the_next_header_puts_all_right() -> None:
