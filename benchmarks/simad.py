@@ -2,7 +2,8 @@
 
 Axes move at random as machines do (``tests/simad/random_steps.py``), some going one way and some
 the other. The baseline is what any method must do at least: to put the edges' times in order with
-``numpy.sort``. Every result is decoded, and has to be exactly what was encoded.
+``numpy.sort``. Every result is decoded, and has to be exactly what was encoded; every edge has to
+keep the rules.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.figure import Figure, alternate
-from sacbus.simad import Encoding, Steps, decode, encode
+from sacbus.simad import Edges, Encoding, Steps, decode, encode
 from tests.simad.random_steps import random_steps
 
 STEPS = 10_000_000
@@ -32,6 +33,22 @@ def check(steps: Steps, coded: Encoding, decoded: Steps, axes: int) -> None:
         assert (told.delay_max, told.moved) == (int(late.max()), int(np.count_nonzero(late)))
 
 
+def check_rules(edges: Edges, axes: int) -> None:
+    """Every edge of a line keeps Gecko's rules, in ns, as written here."""
+    turns = edges.times[edges.lines == 0]
+    falls = []
+    for line in range(1, axes + 1):
+        times = edges.times[edges.lines == line]
+        assert np.all(times[1::2] - times[::2] == 500)
+        assert np.all(times[2::2] - times[1:-1:2] >= 4_000)
+        falls.append(times[::2])
+    fell = np.sort(np.concatenate(falls))
+    following = np.searchsorted(fell, turns)
+    before, behind = following > 0, following < fell.size
+    assert np.all(turns[before] - fell[following[before] - 1] >= 500)
+    assert np.all(fell[following[behind]] - turns[behind] >= 4_000)
+
+
 def figures(rounds: int) -> list[Figure]:
     """Steps per second, both ways."""
     found = []
@@ -39,6 +56,7 @@ def figures(rounds: int) -> list[Figure]:
         steps = random_steps(axes, axes, STEPS)
         coded = encode(steps, axes)
         check(steps, coded, decode(coded.edges), axes)
+        check_rules(coded.edges, axes)
         told = coded.report
         edges = np.concatenate((coded.falls, coded.falls + 500))
         few = min(rounds, 3)
