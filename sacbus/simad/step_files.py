@@ -131,7 +131,8 @@ def _of_array(path: Path) -> Iterator[_Columns]:
         for piece in pieces:
             if int(piece.max()) > _LARGEST:
                 raise SimadError(f"{path}: expected numbers below 2**63, got {piece.max()}")
-        yield _Columns(*(piece.astype(np.int64) for piece in pieces), first)
+        times, axes, ways = (piece.astype(np.int64) for piece in pieces)
+        yield _Columns(times, axes, ways, first)
 
 
 def _of_lines(path: Path, file: TextIO) -> Iterator[_Columns]:
