@@ -20,7 +20,9 @@ from sacbus.links.places import PtyAt, Rfc2217At, TcpAt
 from sacbus.mother import BadRequest, LineLost
 from sacbus.mother.superstepper import NoReply, SuperStepper
 from sacbus.wire.superstepper import (
+    Answer,
     Decay,
+    Expanded,
     Rate,
     Status,
 )
@@ -115,6 +117,17 @@ async def test_9_bit_mode_works_behind_rfc_2217() -> None:
             assert await master.read_word(3, 3) == 32_000
             assert await master.read(4, 2) == 10
         assert bus.snapshot(3).counters["ack"] == 2
+
+
+@pytest.mark.asyncio
+async def test_bytes_without_ninth_bits_are_headers_on_a_9_bit_bus() -> None:
+    async with hosted(settings={"jmp2": "closed"}, links=(PtyAt(None),)) as bus:
+        (link,) = bus.links
+        async with SuperStepper.connect(link.where) as master:
+            assert await master.send(3, Expanded()) == Answer(3)  # a header and no more
+            with pytest.raises(NoReply):
+                await master.status(3)
+        assert bus.snapshot(3).counters["messages"] == 1
 
 
 def test_the_eeprom_outlives_the_bus(tmp_path: Path) -> None:
