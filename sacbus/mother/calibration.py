@@ -155,10 +155,8 @@ def _command(rpm: int, seconds: float, drive: Drive) -> tuple[str, Motion]:
 
     With the start wait, which is over when the start is told of.
     """
-    if not isinstance(rpm, int) or not isfinite(seconds):
-        raise BadRequest(
-            f"calibration at {rpm} RPM for {seconds} s: expected whole RPM, and a time that ends"
-        )
+    if not isfinite(seconds):
+        raise BadRequest(f"calibration at {rpm} RPM for {seconds} s: expected a time that ends")
     steps = round(rpm * drive.steps_per_rev * seconds / 60)
     if rpm < 1 or steps < 1:
         raise BadRequest(

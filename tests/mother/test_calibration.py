@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -173,19 +172,18 @@ async def test_nothing_to_time_is_refused(mother: Mother, rpm: int, seconds: flo
 
 
 @pytest.mark.parametrize(
-    ("rpm", "seconds", "told"),
+    ("seconds", "told"),
     [
-        (60, float("nan"), "expected whole RPM, and a time that ends"),
-        (60, float("inf"), "expected whole RPM, and a time that ends"),
-        (60.5, 60, "calibration at 60.5 RPM for 60 s: expected whole RPM"),
-        (60, 1e9, "expected at most 4294967295 steps, got 200000000000; take fewer seconds"),
+        (float("nan"), "expected a time that ends"),
+        (float("inf"), "expected a time that ends"),
+        (1e9, "expected at most 4294967295 steps, got 200000000000; take fewer seconds"),
     ],
 )
 async def test_what_no_command_can_say_is_refused_and_nothing_is_sent(
-    mother: Mother, rpm: Any, seconds: float, told: str
+    mother: Mother, seconds: float, told: str
 ) -> None:
     with pytest.raises(BadRequest, match=told):
-        await calibrate(mother, 10, rpm=rpm, seconds=seconds)
+        await calibrate(mother, 10, seconds=seconds)
     assert not mother.statistics
 
 

@@ -7,7 +7,7 @@ import itertools
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar, cast
 
 import pytest
 
@@ -292,8 +292,7 @@ async def test_an_emergency_stop_that_meets_the_release_is_told(
     bus: VirtualBus, mother: Mother, moment: float
 ) -> None:
     call = asyncio.create_task(mother.group(x=10, y=11).move(x=4_000, y=4_000))
-    while not mother.statistics[0].sent:  # y
-        await asyncio.sleep(0.000_1)
+    await bus.reached(lambda: mother.statistics[0].sent > 0, within="1 s")  # y
     await asyncio.sleep(moment)
     await mother.estop()
     with pytest.raises(Stopped, match="an emergency stop came first"):
@@ -436,10 +435,10 @@ async def test_what_no_group_can_be_is_refused(mother: Mother) -> None:
     ],
 )
 async def test_what_no_axis_can_do_is_refused_and_nothing_is_sent(
-    mother: Mother, command: Any, told: str
+    mother: Mother, command: object, told: str
 ) -> None:
     with pytest.raises(BadRequest, match=told):
-        await mother.group(x=10, y=11).start(y=400, x=command)
+        await mother.group(x=10, y=11).start(y=400, x=cast("int", command))
     assert not mother.statistics
 
 
