@@ -143,10 +143,10 @@ def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
     from sacbus.kernel import SECOND
     from sacbus.mother import Mother, MotherError, QueueStream
 
-    at = 0
+    at, stopped = 0, False
 
     async def stream(progress: Callable[[int], object]) -> dict[str, object]:
-        nonlocal at
+        nonlocal at, stopped
         async with Mother.connect(wanted.link, baud=wanted.baud) as mother:
             stream = QueueStream(
                 mother,
@@ -160,7 +160,7 @@ def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
             try:
                 await stream.run(motions(), progress=progress)
             finally:
-                at = stream.row
+                at, stopped = stream.row, stream.stopped
             return {
                 "rows": count,
                 "streamed": True,
@@ -175,7 +175,8 @@ def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
         with shown_progress("running", wanted.rows.count) as progress:
             return asyncio.run(stream(progress))
     except KeyboardInterrupt:
-        _tell_where(wanted, at, "was stopped with S at")
+        silent = "has not acknowledged S, so it may go on; it was, as far as is known, at"
+        _tell_where(wanted, at, "was stopped with S at" if stopped else silent)
         raise
     except MotherError:
         _tell_where(wanted, at, "was, as far as is known, at")
