@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sacbus.cli.drive import drive_options, tuning_options
+from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
 from sacbus.cli.options import WrongInput, baud, verbose
 from sacbus.cli.outcomes import failures, told
 from sacbus.cli.rows import Rows, opened_rows, shown_progress
@@ -74,15 +74,8 @@ def put_command(link: str, node: int, file: str, **given: Any) -> int:  # noqa: 
     """
     from sacbus.language import QUEUE_LENGTH, Defaults
     from sacbus.mother import RowRefused
-    from sacbus.motion import Drive
 
-    drive = Drive(
-        sprf=given["sprf"],
-        slow_rpm=given["slow"],
-        ustep=given["ustep"],
-        ihd=given["ihd"],
-        xclk=given["xclk"],
-    )
+    drive = tuned_drive(given)
     defaults = Defaults(sprf=drive.steps_per_rev, cw=given["direction"].upper() == "CW")
     with opened_rows(file, defaults) as rows:
         wanted = _Wanted(link, node, given["baud"], rows, drive, defaults)

@@ -89,7 +89,7 @@ class GroupRun:
     async def wait(self) -> None:
         """Wait until the planned time has passed; who is cancelled meanwhile stops nothing.
 
-        :class:`Stopped` when an emergency stop came before.
+        :class:`Stopped` when an emergency stop has come since the start, be it after the end.
         """
         if self._mother.caller.stops != self._stops:
             raise Stopped(0, "")
