@@ -2,10 +2,11 @@
 
     python examples/pictures.py DIRECTORY
 
-Writes four files into DIRECTORY: the harmonic curve from 10 to 100 RPM, its last steps before the
-target, the linear ramp, and the pulses of a move of (240, 200) steps as Bresenham's algorithm gives
-them and as two SACs do. It needs matplotlib: python -m pip install 'sacbus[plot]'. The status is 0
-when all are written, 1 when a file cannot be, 2 without matplotlib.
+Writes five files into DIRECTORY: the harmonic curve from 10 to 100 RPM, its last steps before the
+target, the linear ramp, the pulses of a move of (240, 200) steps as Bresenham's algorithm gives
+them and as two SACs do, and how even they are all along the move. It needs matplotlib: python -m
+pip install 'sacbus[plot]'. The status is 0 when all are written, 1 when a file cannot be, 2 without
+matplotlib.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING
 from sacbus.fresh import fresh_file
 from sacbus.motion import TICKS_PER_US, Drive
 from sacbus.plan import Planned, plan_sequence
+from sacbus.toolpath import Axis, Machine, Pulses, bresenham, plan_line, side_by_side
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,21 +99,6 @@ def linear() -> Figure:
     return figure
 
 
-def bresenham(steps: int, lead: int) -> list[int]:
-    """At which steps of the lead axis the minor one steps too, when it has ``steps`` of ``lead``.
-
-    The error grows by the minor axis' share at each step of the lead axis; where it comes to a
-    whole step, one is made. The minor axis is tethered to the clock of the lead axis.
-    """
-    stepped, error = [], lead // 2
-    for at in range(lead):
-        error += steps
-        if error >= lead:
-            error -= lead
-            stepped.append(at)
-    return stepped
-
-
 def two_axes() -> Figure:
     """A move of (240, 200): one clock for both axes, or each axis on its own."""
     # The minor axis has 5/6 of the steps, of the velocity (a cycle 6/5 as long) and of the
@@ -139,6 +126,39 @@ def two_axes() -> Figure:
     return figure
 
 
+def jitter() -> Figure:
+    """The periods of the minor axis of (240, 200), as it is planned, beside Bresenham's."""
+    machine = Machine((Axis("X", 10, 100.0), Axis("Y", 11, 100.0)))
+    block = plan_line(machine, (240, 200), 300)
+    lead, minor = (
+        Pulses(axis, run).times(0, run.end) / TICKS_PER_US / 1_000
+        for axis, run in zip(machine.axes, block.runs, strict=True)
+    )
+    found = side_by_side(machine, block)
+    assert found is not None  # two axes, and pulses enough
+    figure = new_figure(4.2)
+    above, below = figure.subplots(2, 1, sharex=True, sharey=True)
+    tethered = lead[bresenham(200, 240)]
+    for axes, times, told, title in (
+        (above, tethered, found.tethered, "Bresenham: every sixth step of the lead axis is missed"),
+        (below, minor, found.own, "Two SACs, as mother plans the line"),
+    ):
+        axes.set_title(title, fontsize=10, loc="left")
+        periods = [after - before for before, after in pairwise(times)]
+        axes.plot(times[1:], periods, color=MINOR, linewidth=0.8)
+        axes.text(
+            0.5,
+            0.85,
+            f"jitter at speed {100 * told.std:.1f} %, at most {100 * told.most:.1f} %",
+            ha="center",
+            transform=axes.transAxes,
+            fontsize=8,
+        )
+        axes.set(ylabel="period, ms", ylim=(0, 12))
+    below.set(xlabel="time, ms", xlim=(0, float(lead[-1])))
+    return figure
+
+
 def new_figure(height: float) -> Figure:
     """An empty figure of the width that all have; inches."""
     from matplotlib.figure import Figure  # noqa: PLC0415 (main says so if it is not there)
@@ -159,6 +179,7 @@ PICTURES: dict[str, Callable[[], Figure]] = {
     "last-steps.svg": last_steps,
     "linear.svg": linear,
     "two-axes.svg": two_axes,
+    "jitter.svg": jitter,
 }
 
 

@@ -91,7 +91,7 @@ class HostedBus:
     def shared_line(self, pin: str, addresses: Iterable[int]) -> SharedLine:
         """A wire to the same pin of these nodes: ``"sync"``, ``"xclk"``, ``"estop"``.
 
-        NoSuchNode when there is none of them.
+        NoSuchNode for an address at which there is none.
         """
         return SharedLine(pin, [self.panel(address) for address in addresses], self.host)
 

@@ -51,6 +51,7 @@ GIVEN = {
     "check": ["/nonexistent"],
     "scan": ["/nonexistent"],
     "estop": ["/nonexistent"],
+    "gcode": ["/nonexistent", "--axis", "X=10:400"],
     "eeprom": ["show", "/nonexistent"],
     "kinds": [],
     "run": ["/nonexistent.toml"],

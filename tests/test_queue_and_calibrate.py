@@ -284,6 +284,31 @@ def test_ctrl_c_stops_the_node_and_says_in_which_row(tmp_path: Path) -> None:
     asyncio.run(scene())
 
 
+def test_ctrl_c_that_the_node_does_not_acknowledge_is_told_as_such(tmp_path: Path) -> None:
+    file = tmp_path / "long.csv"
+    # A quarter of a minute each: with 29 of them written, nothing is on the line.
+    file.write_text(rows_of(31, "3000 , 0 , 1 , 60 , 5000 , 0 , 999 , 999 , 0 , 0 , 0"), newline="")
+
+    async def scene() -> None:
+        async with bus_and_command(tmp_path, "queue", "put", "LINK", "10", str(file)) as (
+            bus,
+            command,
+        ):
+            await reached(lambda: bus.snapshot(10).position_steps > 400)
+            bus.panel(10).power(on=False)
+            command.send_signal(signal.SIGINT)
+            async with asyncio.timeout(PATIENCE):
+                _out, err = await command.communicate()
+            told, _, interrupted = err.decode().splitlines()
+            assert told == (
+                "node 10 has not acknowledged S, so it may go on; it was, as far as is known, at "
+                f"{file} line 1, row 1 of 31"
+            )
+            assert (command.returncode, interrupted) == (130, "interrupted")
+
+    asyncio.run(scene())
+
+
 def test_a_node_that_dies_is_told_with_the_row_it_was_in(tmp_path: Path) -> None:
     file = tmp_path / "long.csv"
     file.write_text(rows_of(200, STEADY), newline="")

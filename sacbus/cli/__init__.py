@@ -21,6 +21,7 @@ from sacbus.cli.dissector import dissector_command
 from sacbus.cli.eeprom import eeprom_group
 from sacbus.cli.estop import estop_command
 from sacbus.cli.export import export_command
+from sacbus.cli.gcode import gcode_command
 from sacbus.cli.kinds import kinds_command
 from sacbus.cli.monitor import monitor_command
 from sacbus.cli.options import INTERRUPTED, USAGE_STATUS, help_unless_asked, shortened, verbose
@@ -64,6 +65,7 @@ for command in (
     monitor_command,
     run_command,
     plan_command,
+    gcode_command,
     queue_group,
     calibrate_command,
     export_command,

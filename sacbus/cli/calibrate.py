@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from sacbus.cli.drive import drive_options, tuning_options
+from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
 from sacbus.cli.options import baud, verbose
 from sacbus.cli.outcomes import failures, told
 
@@ -69,15 +69,7 @@ def calibrate_command(
     Example: sacbus calibrate /dev/ttyUSB0 10 --rpm 60
              sacbus calibrate /tmp/sacbus 10 --rpm 5 --ihd 11 --json
     """
-    from sacbus.motion import Drive
-
-    drive = Drive(
-        sprf=given["sprf"],
-        slow_rpm=given["slow"],
-        ustep=given["ustep"],
-        ihd=given["ihd"],
-        xclk=given["xclk"],
-    )
+    drive = tuned_drive(given)
     try:
         with _progress() as progress:
             found = asyncio.run(

@@ -5,12 +5,15 @@ The same words, defaults and limits wherever something is planned.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Final, TypeVar
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-__all__ = ["drive_options", "tuning_options"]
+if TYPE_CHECKING:
+    from sacbus.motion import Drive
+
+__all__ = ["drive_options", "tuned_drive", "tuning_options"]
 
 _F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command has
 
@@ -66,3 +69,16 @@ def tuning_options(command: _F) -> _F:
     ):
         command = option(command)
     return command
+
+
+def tuned_drive(given: Mapping[str, Any]) -> Drive:
+    """The drive that both kinds of options describe, by their parameters' names."""
+    from sacbus.motion import Drive
+
+    return Drive(
+        sprf=given["sprf"],
+        slow_rpm=given["slow"],
+        ustep=given["ustep"],
+        ihd=given["ihd"],
+        xclk=given["xclk"],
+    )

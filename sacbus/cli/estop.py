@@ -21,8 +21,9 @@ def estop_command(link: str, baud: int, as_json: bool) -> int:
     """Emergency stop: send S to all nodes, at once and twice more 1 ms apart.
 
     LINK is the path of a serial port or of a bus's pty, socket://host:port or rfc2217://host:port.
-    Nobody answers a broadcast: status 0 says that it was sent. It is no substitute for a switch
-    that takes the power away. It speaks SAC: on a line of another protocol its bytes mean
+    Nobody answers a broadcast: status 0 says that it was sent. A port that another program has
+    cannot be had: stop that program, or have a link of its own for this. It is no substitute for a
+    switch that takes the power away. It speaks SAC: on a line of another protocol its bytes mean
     something else, and need stop nothing.
 
     \b

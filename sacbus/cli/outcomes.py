@@ -14,7 +14,7 @@ from sacbus.cli.options import NO_ANSWER_STATUS
 if TYPE_CHECKING:
     from sacbus.mother import MotherError
 
-__all__ = ["NAK_STATUS", "UNKNOWN_STATUS", "failures", "told"]
+__all__ = ["failures", "told"]
 
 NAK_STATUS: Final = 3
 UNKNOWN_STATUS: Final = 5

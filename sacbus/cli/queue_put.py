@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sacbus.cli.drive import drive_options, tuning_options
+from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
 from sacbus.cli.options import WrongInput, baud, verbose
 from sacbus.cli.outcomes import failures, told
 from sacbus.cli.rows import Rows, opened_rows, shown_progress
@@ -74,15 +74,8 @@ def put_command(link: str, node: int, file: str, **given: Any) -> int:  # noqa: 
     """
     from sacbus.language import QUEUE_LENGTH, Defaults
     from sacbus.mother import RowRefused
-    from sacbus.motion import Drive
 
-    drive = Drive(
-        sprf=given["sprf"],
-        slow_rpm=given["slow"],
-        ustep=given["ustep"],
-        ihd=given["ihd"],
-        xclk=given["xclk"],
-    )
+    drive = tuned_drive(given)
     defaults = Defaults(sprf=drive.steps_per_rev, cw=given["direction"].upper() == "CW")
     with opened_rows(file, defaults) as rows:
         wanted = _Wanted(link, node, given["baud"], rows, drive, defaults)
@@ -143,10 +136,10 @@ def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
     from sacbus.kernel import SECOND
     from sacbus.mother import Mother, MotherError, QueueStream
 
-    at = 0
+    at, stopped = 0, False
 
     async def stream(progress: Callable[[int], object]) -> dict[str, object]:
-        nonlocal at
+        nonlocal at, stopped
         async with Mother.connect(wanted.link, baud=wanted.baud) as mother:
             stream = QueueStream(
                 mother,
@@ -160,7 +153,7 @@ def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
             try:
                 await stream.run(motions(), progress=progress)
             finally:
-                at = stream.row
+                at, stopped = stream.row, stream.stopped
             return {
                 "rows": count,
                 "streamed": True,
@@ -175,7 +168,8 @@ def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
         with shown_progress("running", wanted.rows.count) as progress:
             return asyncio.run(stream(progress))
     except KeyboardInterrupt:
-        _tell_where(wanted, at, "was stopped with S at")
+        silent = "has not acknowledged S, so it may go on; it was, as far as is known, at"
+        _tell_where(wanted, at, "was stopped with S at" if stopped else silent)
         raise
     except MotherError:
         _tell_where(wanted, at, "was, as far as is known, at")

@@ -7,8 +7,8 @@ import json
 
 import click
 
-from sacbus.cli.options import NO_ANSWER_STATUS, baud, verbose
-from sacbus.cli.outcomes import NAK_STATUS, UNKNOWN_STATUS
+from sacbus.cli.options import baud, verbose
+from sacbus.cli.outcomes import told
 
 __all__ = ["send_command"]
 
@@ -38,21 +38,16 @@ def send_command(link: str, line: str, baud: int, accept_duplicates: bool, as_js
     from sacbus.mother import NoAnswer, Refused, UnknownOutcome, addressed_line
 
     node, command = addressed_line(line)
-    statuses = {
-        Refused: ("nak", NAK_STATUS),
-        NoAnswer: ("no answer", NO_ANSWER_STATUS),
-        UnknownOutcome: ("unknown", UNKNOWN_STATUS),
-    }
+    words = {Refused: "nak", NoAnswer: "no answer", UnknownOutcome: "unknown"}
     report: dict[str, object] = {"node": node, "line": command}
     try:
         report |= asyncio.run(_send(link, node, command, baud, accept_duplicates))
     except (Refused, NoAnswer, UnknownOutcome) as failure:
-        outcome, status = statuses[type(failure)]
         if as_json:
+            outcome = words[type(failure)]
             report |= {"outcome": outcome, "attempts": failure.attempts, "round_trip_us": None}
             click.echo(json.dumps(report))
-        click.echo(f"error: {failure}", err=True)
-        return status
+        return told(failure)
     if as_json:
         click.echo(json.dumps(report))
     elif report["outcome"] == "ack":

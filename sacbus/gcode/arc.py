@@ -96,11 +96,15 @@ class Arc:
 
 
 def angle_between(start: Point, end: Point, centre: Point, *, clockwise: bool) -> float:
-    """How far it is from one point to another round a centre; a full circle if they are one."""
-    if math.dist(start, end) < SAME:
-        return -math.tau if clockwise else math.tau
+    """How far it is from one point to another round a centre.
+
+    A full circle if they are one, or lie in the same direction from the centre.
+    """
     begin = math.atan2(start[1] - centre[1], start[0] - centre[0])
     turned = (math.atan2(end[1] - centre[1], end[0] - centre[0]) - begin) % math.tau
+    # Either side of nothing is what arithmetic makes of it.
+    if min(turned, math.tau - turned) * math.dist(start, centre) < SAME:
+        return -math.tau if clockwise else math.tau
     return turned - math.tau if clockwise else turned
 
 

@@ -35,11 +35,13 @@ from sacbus.mother.request import safe_body
 from sacbus.mother.scan import ScanProgress
 from sacbus.mother.soft_ops import SoftOpHeard
 from sacbus.mother.statistics import NodeStatistics
+from sacbus.mother.streamed import StreamBroken, Streamed, WrongNode
 
 if TYPE_CHECKING:
     from sacbus.mother.calibration import Calibration, NoSoftOp, calibrate
     from sacbus.mother.group import Group, GroupMotion, GroupRun, Member
     from sacbus.mother.queue_stream import LostTrack, QueueStream
+    from sacbus.mother.stream import Stream
 
 __all__ = [
     "Acknowledged",
@@ -70,7 +72,11 @@ __all__ = [
     "Share",
     "SoftOpHeard",
     "Stopped",
+    "Stream",
+    "StreamBroken",
+    "Streamed",
     "UnknownOutcome",
+    "WrongNode",
     "addressed_line",
     "calibrate",
     "differences",
@@ -90,6 +96,7 @@ _HOMES: Final = {
     "Member": "group",
     "NoSoftOp": "calibration",
     "QueueStream": "queue_stream",
+    "Stream": "stream",
     "calibrate": "calibration",
 }
 

@@ -19,10 +19,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import isfinite
 from typing import TYPE_CHECKING, Final
 
 from sacbus.kernel import SECOND, US, Ns
 from sacbus.language import NO_RAMP, Defaults, Motion, Move, Session, ThrowAway
+from sacbus.language.queue_file import BITS_32
 from sacbus.mother.errors import BadRequest, MotherError, Stopped
 from sacbus.mother.soft_ops import SoftOpHeard
 from sacbus.motion import TICKS_PER_US, Drive, plan
@@ -128,6 +130,8 @@ async def calibrate(
     try:
         await mother.send(node, "$O1")
         await mother.send(node, line)
+        if mother.caller.stops != stops:
+            raise Stopped(0, "")  # it will not tell of a start
         begun = await _within(_WAIT_US * US + _LATE, mother, heard.begin, "start", node, None)
         part = None if progress is None else _Part(progress, begun, planned)
         patience = planned + planned // _OFF + _LATE
@@ -151,10 +155,17 @@ def _command(rpm: int, seconds: float, drive: Drive) -> tuple[str, Motion]:
 
     With the start wait, which is over when the start is told of.
     """
+    if not isfinite(seconds):
+        raise BadRequest(f"calibration at {rpm} RPM for {seconds} s: expected a time that ends")
     steps = round(rpm * drive.steps_per_rev * seconds / 60)
     if rpm < 1 or steps < 1:
         raise BadRequest(
             f"calibration at {rpm} RPM for {seconds:g} s: expected 1 RPM and one step at least"
+        )
+    if steps > BITS_32:
+        raise BadRequest(
+            f"calibration at {rpm} RPM for {seconds:g} s: expected at most {BITS_32} steps, got "
+            f"{steps}; take fewer seconds"
         )
     ramp = _RAMP100 if rpm > drive.slow else NO_RAMP
     move = Move(

@@ -18,7 +18,7 @@ from sacbus.mother.clock import Clock
 from sacbus.mother.errors import LineLost, MotherError
 from sacbus.mother.estop import EmergencyStop
 from sacbus.mother.outcome import Acknowledged, Done, Sent
-from sacbus.mother.pending import Request
+from sacbus.mother.pending import Pending
 from sacbus.mother.request import checked_address, safe_body
 from sacbus.mother.soft_ops import SoftOpHeard, soft_op
 from sacbus.mother.statistics import NodeStatistics
@@ -77,8 +77,8 @@ class Caller:
         self._tries = tries
         self._gap = gap
         self._receiver = PacketReceiver()
-        self._waiting: deque[Request] = deque()
-        self._outstanding: Request | None = None
+        self._waiting: deque[Pending] = deque()
+        self._outstanding: Pending | None = None
         #: When the outstanding request's answer is overdue, and for when the next look at it is
         #: appointed. Nearly all answers come in time, and nearly all requests do with the
         #: appointment of one before.
@@ -90,10 +90,12 @@ class Caller:
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
         self._pausing = False
-        self._broadcasting: Request | None = None
+        self._broadcasting: Pending | None = None
         #: The emergency stop that is under way, and who waits for its end.
         self._stop: EmergencyStop | None = None
         self._stopping: list[Done] = []
+        #: Emergency stops so far, for those who drive nodes and were not waiting when one came.
+        self.stops = 0
         self._lost: LineLost | None = None
         self.statistics: defaultdict[int, NodeStatistics] = defaultdict(NodeStatistics)
         #: Packets of others, answers that nobody waits for, and line faults, counted.
@@ -124,7 +126,7 @@ class Caller:
         checked_address(node)
         body = safe_body(line)
         self._enqueue(
-            Request(
+            Pending(
                 node,
                 body,
                 encode(node, MOTHER, body),
@@ -144,14 +146,14 @@ class Caller:
         checked_address(node)
         data = encode(node, MOTHER, b"")
         self._enqueue(
-            Request(node, b"", data, done, may_repeat=True, tries=1, slack=min(slack, self._slack))
+            Pending(node, b"", data, done, may_repeat=True, tries=1, slack=min(slack, self._slack))
         )
 
     def broadcast(self, line: bytes, done: Done) -> None:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
         body = safe_body(line)
         self._enqueue(
-            Request(
+            Pending(
                 GENERAL_CALL,
                 body,
                 encode(GENERAL_CALL, MOTHER, body),
@@ -238,7 +240,7 @@ class Caller:
             if request is not None:
                 request.done(self._lost)
 
-    def _enqueue(self, request: Request) -> None:
+    def _enqueue(self, request: Pending) -> None:
         if self._lost is not None:
             request.done(self._lost)
             return
@@ -265,7 +267,7 @@ class Caller:
         self._clock.at(until, self._pause_over)
         return True
 
-    def _attempt(self, request: Request) -> None:
+    def _attempt(self, request: Pending) -> None:
         request.attempts += 1
         clock = self._clock
         request.sent_at = now = clock.now
@@ -345,7 +347,7 @@ class Caller:
         attempt = self._line_time(body + _PADDING) + self._slack + self._gap
         return self._gap + self._tries * attempt
 
-    def _patience(self, request: Request) -> Ns:
+    def _patience(self, request: Pending) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
         return self._line_time(len(request.body)) + request.slack
 
@@ -357,7 +359,7 @@ class Caller:
             known = self._expected[body] = self._rate.span(body + FRAME_BYTES) + answer
         return known
 
-    def _silent(self, request: Request) -> None:
+    def _silent(self, request: Pending) -> None:
         self._outstanding = None
         self.statistics[request.node].timeouts += 1
         request.last = "silence"

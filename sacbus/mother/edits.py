@@ -15,7 +15,7 @@ from sacbus.mother.errors import BadRequest
 
 __all__ = ["LONGEST_EDIT", "edit_lines", "hold_line"]
 
-#: Bytes of an edit: 46 fit a device, and two may be taken by what keeps its CRC from being lost.
+#: Bytes of an edit (spec): 46 fit a device, less the space that its CRC may need, and one to spare.
 LONGEST_EDIT: Final = 44
 
 _FACTORY: Final = Defaults()
@@ -27,16 +27,15 @@ def edit_lines(
     defaults: Defaults = _FACTORY,
     *,
     before: Motion | None = None,
-    longest: int = LONGEST_EDIT,
 ) -> list[str]:
     """The edits, in order, after which ``position`` (1 to 30) holds just this motion.
 
     ``defaults`` are the node's: its default direction, which a command without a sign has, and its
-    sprf, by which RPM and cycle follow each other. Mostly one line; what is longer than ``longest``
-    is several. Whether it is held for sync is always said last: a position that is held stays so
-    until all else is in it. ``before``: what it holds for certain, since it was written by these
-    very edits; then only what differs is named, nothing at all if nothing does. Else every field
-    is. :class:`BadRequest` for what no line can say.
+    sprf, by which RPM and cycle follow each other. Mostly one line; what is longer than
+    ``LONGEST_EDIT`` is several. Whether it is held for sync is always said last: a position that is
+    held stays so until all else is in it. ``before``: what it holds for certain, since it was
+    written by these very edits; then only what differs is named, nothing at all if nothing does.
+    Else every field is. :class:`BadRequest` for what no line can say.
     """
     _check(position, motion)
     parts = _parts(motion, defaults) if before is None else _changes(motion, before, defaults)
@@ -44,7 +43,7 @@ def edit_lines(
         return []
     lines = [f"q{position}"]
     for text in (part.text() for part in parts):
-        if len(lines[-1]) + len(text) > longest:
+        if len(lines[-1]) + len(text) > LONGEST_EDIT:
             lines.append(f"q{position}")
         lines[-1] += text
     return lines

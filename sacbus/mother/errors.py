@@ -9,8 +9,8 @@ MotherError                        everything below
 ├── Stopped                        an emergency stop came before its turn; never sent
 └── LineLost (ConnectionError)     the link is gone
 
-What only one file raises is there: NoSoftOp (calibration), LostTrack (queue streams), and of
-BadRequest RowRefused (queue files) and NotStreamable.
+What only one file raises is there: NoSoftOp (calibration), LostTrack (queue streams), StreamBroken
+and WrongNode (streams of blocks), and of BadRequest RowRefused (queue files) and NotStreamable.
 """
 
 from __future__ import annotations

@@ -19,9 +19,9 @@ from sacbus.kernel import US, Ns
 from sacbus.language import QUEUE_LENGTH, Defaults, Motion, Move, RunPosition, Session, parse
 from sacbus.language.line import quoted
 from sacbus.mother.edits import edit_lines
-from sacbus.mother.errors import BadRequest, Stopped
+from sacbus.mother.errors import BadRequest, MotherError, Stopped
 from sacbus.mother.mother import Mother
-from sacbus.mother.release import Release, Share, stand_down, start_together
+from sacbus.mother.release import STOP, Release, Share, stand_down, start_together
 from sacbus.mother.request import checked_address
 from sacbus.mother.timeline import DRIFT_PPM, Departure
 from sacbus.motion import TICKS_PER_US, Drive, Profile, plan
@@ -89,7 +89,7 @@ class GroupRun:
     async def wait(self) -> None:
         """Wait until the planned time has passed; who is cancelled meanwhile stops nothing.
 
-        :class:`Stopped` when an emergency stop came before.
+        :class:`Stopped` when an emergency stop has come since the start, be it after the end.
         """
         if self._mother.caller.stops != self._stops:
             raise Stopped(0, "")
@@ -199,11 +199,17 @@ class Group:
         """Stop all axes with S, one after the other, whatever they do.
 
         Where every millisecond counts, the e-stop of mother's is quicker, and stops all nodes.
-        The first error of a node is raised when all others have been sent theirs.
+        Those that do not acknowledge it are sent it once more when all others have been sent
+        theirs; the first error of these is raised.
         """
-        failed = await stand_down(self._mother, [member.node for member in self.axes.values()])
-        if failed:
-            await self._mother.send(failed[0], "S")
+        failed: MotherError | None = None
+        for node in await stand_down(self._mother, [member.node for member in self.axes.values()]):
+            try:
+                await self._mother.send(node, STOP)
+            except MotherError as failure:  # the others need theirs
+                failed = failed or failure
+        if failed is not None:
+            raise failed
 
     async def use_common_clock(self, *, on: bool = True) -> None:
         """Have the nodes count the clock at their xclk pins from now on, or again their own.
@@ -247,8 +253,17 @@ def _motion(name: str, command: Command, defaults: Defaults) -> Motion:
     if isinstance(command, Motion):
         return command
     if isinstance(command, int):
+        if not command:
+            raise BadRequest(
+                f"axis {name}: expected steps other than 0; leave out an axis that is to stand"
+            )
         move = Move(abs(command), opposite=command < 0)
     else:
+        if not isinstance(command, str):
+            raise BadRequest(
+                f"axis {name}: expected a line, whole steps or a Motion, got {command!r}, "
+                f"{type(command).__name__}"
+            )
         parsed = parse(command)
         if not isinstance(parsed.command, Move) or parsed.remarks:
             why = f": {parsed.remarks[0]}" if parsed.remarks else ""

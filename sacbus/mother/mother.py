@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Final
 
@@ -26,6 +26,8 @@ from sacbus.wire.times import MOTHER_GAP
 
 if TYPE_CHECKING:
     from sacbus.mother.group import Group, Member
+    from sacbus.mother.streamed import Streamed
+    from sacbus.toolpath import Block, Machine
 
 __all__ = ["LINK_SLACK", "Mother", "addressed_line"]
 
@@ -61,8 +63,10 @@ class Mother:
         ``set_dtr(asserted=…)`` sets the DTR output of her adapter, and tells whether it has one.
         """
         self._clock = clock
+        #: How long bytes take on the line.
+        self.rate = rate or LineRate()
         self._set_dtr = set_dtr
-        self._caller = Caller(clock, send, rate=rate, slack=slack, unsent=unsent, gap=gap)
+        self._caller = Caller(clock, send, rate=self.rate, slack=slack, unsent=unsent, gap=gap)
         self._arrive = arrive or _call
         #: Those who wait for a time by mother's clock.
         self._sleepers: set[asyncio.Future[None]] = set()
@@ -217,6 +221,24 @@ class Mother:
         called after each address. Other calls have their turns in between.
         """
         return await scan(self._caller, self._acknowledged, addresses, progress)
+
+    async def run(
+        self,
+        blocks: Iterable[Block],
+        machine: Machine,
+        *,
+        progress: Callable[[Streamed], object] | None = None,
+        halt: Callable[[str, bool], Awaitable[object]] | None = None,
+    ) -> Streamed:
+        """Run the blocks of a toolpath on a machine's nodes; returns when all axes stand again.
+
+        ``progress`` is called with each block that begins. ``halt`` is awaited for what the path
+        tells somebody, with its text and whether it waits. Raises as
+        :meth:`~sacbus.mother.Stream.run`, which this is; a ``Stream`` has more settings.
+        """
+        from sacbus.mother.stream import Stream  # noqa: PLC0415 (it stands on this file)
+
+        return await Stream(self, machine, progress=progress, halt=halt).run(blocks)
 
     async def _acknowledged(self, ask: Callable[[Done], None]) -> Acknowledged:
         outcome = await self._outcome(ask)

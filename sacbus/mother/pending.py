@@ -11,11 +11,11 @@ from sacbus.kernel import Ns
 from sacbus.mother.errors import MotherError, NoAnswer, Refused, Stopped, UnknownOutcome
 from sacbus.mother.outcome import Done
 
-__all__ = ["Request"]
+__all__ = ["Pending"]
 
 
 @dataclass(slots=True)
-class Request:
+class Pending:
     """One packet for ``node`` (0: all), sent up to ``tries`` times; ``done`` is told the outcome.
 
     ``slack``: how late its answer may be, beyond the line's own figures.

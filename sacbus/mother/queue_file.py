@@ -96,14 +96,16 @@ class QueueFile:
         """
         # The position itself may be beyond a node's 30, in a file that is streamed.
         parsed = parse(f"q1{edit}")
-        if not isinstance(parsed.command, EditQueue) or parsed.remarks:
+        command = parsed.command
+        # Digits at its beginning would make another position of it.
+        if not isinstance(command, EditQueue) or parsed.remarks or edit[0].isdigit():
             why = f": {parsed.remarks[0]}" if parsed.remarks else ""
             raise BadRequest(
                 f"queue position {position}: expected an edit such as m400v120, got "
                 f"{quoted(edit)}{why}"
             )
         before = self._motions.get(position) or seeded_row(self.defaults)
-        self[position] = motion = edited(before, parsed.command.edit, self.defaults)
+        self[position] = motion = edited(before, command.edit, self.defaults)
         return motion
 
     def __getitem__(self, position: int) -> Motion:

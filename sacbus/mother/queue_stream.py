@@ -127,6 +127,8 @@ class QueueStream:
         self.pauses = 0
         #: In which row it was stopped before its end; None as long as it was not.
         self._stopped_in: int | None = None
+        #: Whether the node has acknowledged the S that stopped it before its end.
+        self.stopped = False
         #: Emergency stops before it began.
         self._stops = 0
         self._progress: Callable[[int], object] | None = None
@@ -166,10 +168,10 @@ class QueueStream:
         commands. ``motions`` is taken some 30 at a time, so it may be of any length.
         ``progress`` is called now and then with the number of rows that are over.
 
-        Whatever ends it early, a cancelled call too, the node is stopped with S where it is, and
-        :attr:`row` tells in which row. Raises :class:`RowRefused` at one that cannot be streamed,
-        :class:`LostTrack`, :class:`Stopped` upon an emergency stop, and what :meth:`Mother.send`
-        does.
+        Whatever ends it early, a cancelled call too, the node is stopped with S where it is:
+        :attr:`row` tells in which row, and :attr:`stopped` whether it has acknowledged that. Raises
+        :class:`RowRefused` at one that cannot be streamed, :class:`LostTrack`, :class:`Stopped`
+        upon an emergency stop, and what :meth:`Mother.send` does.
         """
         self._progress = progress
         self._stops = self._mother.caller.stops
@@ -186,6 +188,7 @@ class QueueStream:
             # What went wrong is worth telling, not what more goes wrong because of it.
             with suppress(MotherError):
                 await self._mother.send(self.node, "S")
+                self.stopped = True
             raise
 
     def _planned(self, motions: Iterable[Motion]) -> Iterator[Motion]:

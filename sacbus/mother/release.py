@@ -74,7 +74,8 @@ async def start_together(
     before the first is held. :class:`NotStarted` when a node fails: then none has started, and
     those that may be held have been sent ``S``; so they have when the call is cancelled, or when
     ``release`` raises, whose error is then passed on as it is. An emergency stop in the middle is
-    a failure, too.
+    a failure, too; one that comes while they are released is :class:`Stopped`, for some may have
+    started.
     """
     held: list[int] = []
     stops = mother.caller.stops
@@ -98,6 +99,8 @@ async def start_together(
     earliest = mother.now
     try:
         await (broadcast_release(mother) if release is None else release())
+        if mother.caller.stops != stops:
+            raise Stopped(0, "")
     except BaseException:
         await stand_down(mother, held)
         raise

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -26,19 +25,24 @@ def words(picture: Path) -> str:
     return "\n".join(re.findall(r"<text[^>]*>([^<]*)</text>", picture.read_text(encoding="utf-8")))
 
 
-def test_four_pictures_are_written_and_say_what_they_show(
+def test_five_pictures_are_written_and_say_what_they_show(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert pictures.main([str(tmp_path)]) == 0
-    names = ["harmonic.svg", "last-steps.svg", "linear.svg", "two-axes.svg"]
+    names = ["harmonic.svg", "last-steps.svg", "linear.svg", "two-axes.svg", "jitter.svg"]
     assert capsys.readouterr().out.splitlines() == [str(tmp_path / name) for name in names]
-    assert sorted(file.name for file in tmp_path.iterdir()) == names
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted(names)
     said = {name: words(tmp_path / name) for name in names}
     assert "step 90, 705 ms" in said["harmonic.svg"]
     assert "3333 µs\n3157 µs\n3030 µs\n3000 µs" in said["last-steps.svg"]
     assert "10.47 rad/s², 100 RPM in a second" in said["linear.svg"]
     assert "steps of the minor axis 3.0 ms or 6.0 ms apart" in said["two-axes.svg"]
     assert "steps of the minor axis 3.6 ms apart" in said["two-axes.svg"]
+    tethered, own = re.findall(
+        r"jitter at speed ([\d.]+) %, at most ([\d.]+) %", said["jitter.svg"]
+    )
+    assert [float(figure) for figure in tethered] == pytest.approx([33, 67], abs=3)
+    assert max(float(figure) for figure in own) < 1
 
 
 def test_they_are_the_same_files_every_time(tmp_path: Path) -> None:
@@ -65,13 +69,6 @@ def test_both_axes_of_a_move_are_through_within_one_step() -> None:
     assert x[-1] == pytest.approx(y[-1], abs=3.6)
 
 
-def test_bresenham_makes_every_step_and_waits_every_sixth_time() -> None:
-    stepped = pictures.bresenham(200, 240)
-    assert len(stepped) == 200
-    skipped = sorted(set(range(240)) - set(stepped))
-    assert [after - before for before, after in pairwise(skipped)] == [6] * 39
-
-
 def test_a_directory_that_is_not_there_is_told_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -91,9 +88,11 @@ def test_without_matplotlib_it_says_what_to_install(
     assert "python -m pip install 'sacbus[plot]'" in written.err
 
 
-def test_every_picture_of_the_page_on_planning_is_there() -> None:
+def test_every_picture_of_the_pages_on_planning_and_lines_is_there() -> None:
     shown = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", (DOCS / "planning.md").read_text("utf-8"))
     assert len(shown) == 5
+    shown += re.findall(r"!\[[^\]]+\]\(([^)]+)\)", (DOCS / "lines.md").read_text("utf-8"))
+    assert len(shown) == 6
     for name in shown:
         assert (DOCS / name).read_bytes().startswith(b"<?xml")
         assert (DOCS / name).stat().st_size < 60_000

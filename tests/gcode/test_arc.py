@@ -130,6 +130,13 @@ def test_a_huge_circle_is_made_chord_by_chord() -> None:
         ((-1.0, 0.0), True, -0.5),
         ((1.0, 0.0), False, 1.0),
         ((1.0, 0.0), True, -1.0),
+        # Rounded figures: the end is a little farther out, or a rounding error to either side.
+        ((1.005, 0.0), False, 1.0),
+        ((1.005, 0.0), True, -1.0),
+        ((0.995, 1e-13), False, 1.0),
+        ((0.995, 1e-13), True, -1.0),
+        ((0.995, -1e-13), False, 1.0),
+        ((0.995, -1e-13), True, -1.0),
     ],
 )
 def test_an_angle_is_up_to_a_full_circle(end: Point, clockwise: bool, turned: float) -> None:

@@ -13,6 +13,7 @@ from sacbus.mother import BadRequest, LineLost, NoAnswer, Stopped
 from sacbus.mother.calibration import RPMS, NoSoftOp, calibrate
 from sacbus.motion import Drive
 from sacbus.testing import VirtualBus
+from sacbus.wire.times import MOTHER_GAP
 
 pytestmark = pytest.mark.asyncio
 
@@ -168,6 +169,35 @@ async def test_a_line_that_goes_meanwhile_is_told(bus: VirtualBus, mother: Mothe
 async def test_nothing_to_time_is_refused(mother: Mother, rpm: int, seconds: float) -> None:
     with pytest.raises(BadRequest, match="expected 1 RPM and one step at least"):
         await calibrate(mother, 10, rpm=rpm, seconds=seconds)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        (float("nan"), "expected a time that ends"),
+        (float("inf"), "expected a time that ends"),
+        (1e9, "expected at most 4294967295 steps, got 200000000000; take fewer seconds"),
+    ],
+)
+async def test_what_no_command_can_say_is_refused_and_nothing_is_sent(
+    mother: Mother, seconds: float, told: str
+) -> None:
+    with pytest.raises(BadRequest, match=told):
+        await calibrate(mother, 10, seconds=seconds)
+    assert not mother.statistics
+
+
+async def test_an_emergency_stop_in_the_instant_of_the_ack_is_told_as_such(
+    bus: VirtualBus, mother: Mother
+) -> None:
+    await calibrate(mother, 10, seconds=1)
+    soft_ops, command, _ = mother.statistics[10].round_trips
+    await asyncio.sleep(1)
+    acknowledged = bus.now + soft_ops + MOTHER_GAP + command
+    bus.hosted.bus.kernel.at(acknowledged, mother.caller.estop, lambda _outcome: None)
+    with pytest.raises(Stopped, match="an emergency stop came first"):
+        await calibrate(mother, 10, seconds=1)
+    assert bus.node(10).state == "STANDBY"
 
 
 async def test_an_emergency_stop_ends_it(bus: VirtualBus, mother: Mother) -> None:

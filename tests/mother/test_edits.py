@@ -99,12 +99,6 @@ def test_a_usual_command_is_one_line_with_every_field() -> None:
 def test_a_long_one_is_split_between_fields() -> None:
     long = motion(steps=BITS_32, cycle_us=BITS_32, rpm=0, acc100=1047, wait_us=BITS_32, pulses=True)
     assert edit_lines(30, long) == ["q30m4294967295vc4294967295a10.47d1l0u0", "q30t4294967295ps0"]
-    assert edit_lines(30, long, longest=20) == [
-        "q30m4294967295",
-        "q30vc4294967295",
-        "q30a10.47d1l0u0",
-        "q30t4294967295ps0",
-    ]
 
 
 def test_to_hold_a_position_takes_one_field() -> None:

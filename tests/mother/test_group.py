@@ -7,7 +7,7 @@ import itertools
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import pytest
 
@@ -259,6 +259,19 @@ async def test_a_group_can_be_stopped(bus: VirtualBus, mother: Mother) -> None:
     assert [node.state for node in bus.nodes.values()] == ["STANDBY", "OFF", "STANDBY"]
 
 
+async def test_every_axis_that_does_not_acknowledge_its_stop_is_sent_it_once_more(
+    bus: VirtualBus, mother: Mother
+) -> None:
+    group = mother.group(x=10, y=11, z=12)
+    await group.start(x=4_000, y=4_000, z=4_000)
+    for node in (10, 12):
+        bus.node(node).power(on=False)
+    with pytest.raises(NoAnswer, match="node 10: 'S'"):
+        await group.stop()
+    assert bus.node(11).state == "STANDBY"
+    assert [mother.statistics[node].timeouts for node in (10, 11, 12)] == [6, 0, 6]
+
+
 @pytest.mark.parametrize("moment", [0.001, 0.01, 0.02, 0.03, 0.034, 0.0365, 0.039])
 async def test_an_emergency_stop_before_the_release_lets_nobody_start(
     bus: VirtualBus, mother: Mother, moment: float
@@ -272,6 +285,20 @@ async def test_an_emergency_stop_before_the_release_lets_nobody_start(
     await mother.broadcast("y")
     await asyncio.sleep(10)
     assert [node.position for node in bus.nodes.values()] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("moment", [0.0001, 0.001, 0.0015, 0.0025])
+async def test_an_emergency_stop_that_meets_the_release_is_told(
+    bus: VirtualBus, mother: Mother, moment: float
+) -> None:
+    call = asyncio.create_task(mother.group(x=10, y=11).move(x=4_000, y=4_000))
+    await bus.reached(lambda: mother.statistics[0].sent > 0, within="1 s")  # y
+    await asyncio.sleep(moment)
+    await mother.estop()
+    with pytest.raises(Stopped, match="an emergency stop came first"):
+        await call
+    assert [bus.node(node).state for node in (10, 11)] == ["STANDBY", "STANDBY"]
+    assert bus.node(10).position < 4_000
 
 
 async def test_an_emergency_stop_ends_a_move(bus: VirtualBus, mother: Mother) -> None:
@@ -401,15 +428,17 @@ async def test_what_no_group_can_be_is_refused(mother: Mother) -> None:
         ("85m400", "axis x: expected a motion command"),
         ("m400v0", "expected the velocity in RPM, at least 1"),
         ("m", "axis x: expected a motion with an end, got a continuous one"),
-        (0, "axis x: expected a motion with an end"),
+        (0, "axis x: expected steps other than 0; leave out an axis that is to stand"),
+        (400.0, "axis x: expected a line, whole steps or a Motion, got 400.0, float"),
+        (None, "axis x: expected a line, whole steps or a Motion, got None, NoneType"),
         (2**32, "queue position 30: expected steps of 0 to 4294967295"),
     ],
 )
 async def test_what_no_axis_can_do_is_refused_and_nothing_is_sent(
-    mother: Mother, command: str | int, told: str
+    mother: Mother, command: object, told: str
 ) -> None:
     with pytest.raises(BadRequest, match=told):
-        await mother.group(x=10, y=11).start(y=400, x=command)
+        await mother.group(x=10, y=11).start(y=400, x=cast("int", command))
     assert not mother.statistics
 
 

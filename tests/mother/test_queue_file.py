@@ -203,7 +203,7 @@ def test_a_position_that_is_new_is_edited_as_that_of_a_new_node() -> None:
     assert (motion.steps, motion.rpm, motion.cycle_us, motion.sync) == (400, 60, 2_500, True)
 
 
-@pytest.mark.parametrize("edit", ["", "q", "nonsense", "m400v0", "a99999"])
+@pytest.mark.parametrize("edit", ["", "q", "nonsense", "m400v0", "a99999", "5m400"])
 def test_an_edit_that_a_node_would_not_take_as_it_stands_is_refused(edit: str) -> None:
     file = QueueFile(companion())
     before = file.rows

@@ -238,6 +238,7 @@ async def test_cancelled_it_stops_the_node_and_knows_where(bus: VirtualBus, moth
     call.cancel()
     with pytest.raises(asyncio.CancelledError):
         await call
+    assert stream.stopped
     assert bus.node(10).state == "STANDBY"
     assert bus.node(10).position == pytest.approx(4_250, abs=2)
     await asyncio.sleep(60)

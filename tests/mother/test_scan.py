@@ -109,6 +109,18 @@ def test_even_at_a_hundredth_where_one_question_in_two_is_lost_nearly_all_are_fo
     virtually(nodes, play)
 
 
+@pytest.mark.parametrize("seed", [4, 16, 28])
+def test_a_node_that_says_nak_and_then_nothing_does_not_end_a_scan(seed: int) -> None:
+    async def play(bus: HostedBus, mother: Mother) -> None:
+        bus.fault(BitErrors(4e-2))
+        found = {one.node for one in await mother.scan(range(10, 60))}
+        naks = {node for node, one in mother.statistics.items() if one.naks and one.timeouts > 2}
+        assert naks
+        assert len(found) > 10
+
+    virtually(range(10, 60), play, seed=seed)
+
+
 def test_nodes_are_found_on_a_link_that_is_slower_than_a_sweep_is_patient() -> None:
     async def scene() -> None:
         async with open_bus(Configuration(nodes=(10, 85))) as bus:
