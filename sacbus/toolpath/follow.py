@@ -196,10 +196,9 @@ class _Follower:
         now, due = self._commands.next, self._due(steps, upto, until)
         if due <= now:
             return True
-        if due == self._over and steps > 1:
-            # If it shows that the last period is cut short, that is a command of its own.
-            if sweep.steps + self._half - sweep.at(due) > self._apart:
-                return False
+        cut = sweep.steps + self._half - sweep.at(due) if due == self._over else 0.0
+        if cut > self._apart and steps > 1:
+            return False  # it would show; so the last step is a command of its own
         if sweep.spread(begin, begin + steps - 2 * self._half) > self._alike:
             return False
         # What it is off at its ends is given; only what comes in between is this velocity's fault.
