@@ -147,6 +147,8 @@ def test_a_program_that_is_wrong_moves_nothing_and_all_mistakes_are_told(
         (["--axis", "X=10:4", "--axis", "x=11:4"], "expected each axis's own letter"),
         (["--axis", "X=10:4", "--axis", "Y=10:4"], "expected each axis's own node"),
         (["--machine", "nowhere.toml"], "cannot read the machine file"),
+        ([*AXES, "--tolerance", "0"], "expected a number from 1e-06 to 10, got 0"),
+        ([*AXES, "--tolerance", "nan"], "expected a number from 1e-06 to 10, got nan"),
         ([*AXES, "--link", "x", "--plan-only"], "expected --link or --plan-only, got both"),
         ([*AXES, "--link", "x", "--record", "r"], "--record: expected a simulation"),
         ([*AXES, "--json", "-o", "-"], "--json: expected -o to be a file"),
@@ -173,7 +175,15 @@ def test_a_stretch_that_no_machine_has_is_refused(program: Path, capsys: Capture
     program.write_text("G1 X1\nG1 X99999999\n")
     assert run(["gcode", str(program), *AXES]) == 2
     (error,) = capsys.readouterr().err.splitlines()
-    assert error.startswith(f"error: {program}, line 2: X would go 3999999920 steps at once")
+    assert error == (
+        "error: X: would go 3999999920 steps at once, 100000000 at most, "
+        f"{program}:2:1, check units and steps per mm"
+    )
+    # The chords of an arc are not worked out before.
+    program.write_text("G1 X1\nG2 X1 Y100000000 R90000000\n")
+    assert run(["gcode", str(program), "--axis", "X=10:1000000", "--axis", "Y=11:1"]) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    assert error.startswith(f"error: {program}, line 2: X would go ")
 
 
 def test_output_never_replaces_the_program(program: Path, capsys: Captured) -> None:
@@ -207,5 +217,19 @@ def test_a_bar_shows_how_far_it_is_and_ctrl_c_says_how_far_it_came(tmp_path: Pat
         assert gcode.wait(30) == 130
     os.close(near)
     assert b"stopped: " in seen
-    assert b" blocks " in seen
+    assert re.search(rb"in block \d+, lines \d+ to \d+, on the way to X", seen)
     assert seen.endswith(b"interrupted\r\n")
+
+
+def test_a_halt_that_waits_wants_a_terminal_before_anything_moves(program: Path) -> None:
+    told = subprocess.run(
+        [sys.executable, "-m", "sacbus", "gcode", str(program), *AXES, "--link", "nowhere"],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        start_new_session=True,
+    )
+    # It has not even tried to open the link.
+    assert told.returncode == 2
+    assert told.stderr == "error: M0 waits for somebody, and there is no terminal, run it at one\n"

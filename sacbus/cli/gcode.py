@@ -27,7 +27,7 @@ from sacbus.cli.recordings import (
 from sacbus.fresh import fresh_file
 
 if TYPE_CHECKING:
-    from sacbus.gcode import Survey
+    from sacbus.gcode import Checked
     from sacbus.machining import Course, Machined, Told
     from sacbus.toolpath import Axis, Machine
 
@@ -68,6 +68,18 @@ def _read_axes(
     return tuple(sorted(axes, key=lambda axis: LETTERS.index(axis.name)))
 
 
+def _read_tolerance(
+    _ctx: click.Context, _param: click.Parameter, given: float | None
+) -> float | None:
+    """As of a machine file."""
+    from sacbus.config.machine import MACHINE
+
+    (key,) = (key for key in MACHINE if key.name == "tolerance")
+    if given is not None and not key.fits(given):
+        raise click.BadParameter(f"expected {key.allowed}, got {given:g}")
+    return given
+
+
 @click.command("gcode")
 @click.argument("file", metavar="FILE.ngc")
 @click.option(
@@ -83,8 +95,9 @@ def _read_axes(
 )
 @click.option(
     "--tolerance",
-    type=click.FloatRange(1e-6, 10),
+    type=float,
     metavar="MM",
+    callback=_read_tolerance,
     help="By how much chords may part from an arc. [default: the machine's, 0.01]",
 )
 @click.option(
@@ -172,6 +185,8 @@ def gcode_command(
             if plan_only:
                 machined = plan(course, baud=baud, progress=progress.come_to)
             elif link is not None:
+                if checked.waits:
+                    os.close(_terminal())  # before anything moves
                 machined = run_on_link(course, progress.told(_ask), link, baud=baud)
             else:
                 sink = None if record is None else stack.enter_context(Path(record).open("wb"))
@@ -209,7 +224,7 @@ def _machine(axes: tuple[Axis, ...], machine_file: str | None, tolerance: float 
     return machine if tolerance is None else replace(machine, tolerance=tolerance)
 
 
-def _checked(program: PartProgram, machine: Machine) -> Survey | None:
+def _checked(program: PartProgram, machine: Machine) -> Checked | None:
     """What the program comes to; None when it is wrong, which has been told then."""
     from sacbus.gcode import GcodeError, check_program
 
@@ -255,20 +270,32 @@ async def _ask(say: Callable[[str], object], text: str, waits: bool) -> None:
         await _key()
 
 
-async def _key() -> None:
-    """Wait until somebody at the terminal presses Enter."""
+def _terminal() -> int:
+    """A descriptor of the terminal, whatever standard input is."""
     try:
-        terminal = os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY)
+        return os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY)
     except OSError as fault:
         raise WrongInput(
             "M0 waits for somebody, and there is no terminal, run it at one"
         ) from fault
+
+
+async def _key() -> None:
+    """Wait until somebody at the terminal presses Enter."""
+    terminal = _terminal()
     loop = asyncio.get_running_loop()
     pressed = loop.create_future()
 
     def read() -> None:
-        if os.read(terminal, 1024) and not pressed.done():
-            pressed.set_result(None)
+        if pressed.done():
+            return
+        try:
+            if os.read(terminal, 1024):  # Ctrl-D is no Enter
+                pressed.set_result(None)
+        except OSError as fault:
+            gone = WrongInput("M0 waits for somebody, and the terminal is gone, run it at one")
+            gone.__cause__ = fault
+            pressed.set_exception(gone)
 
     loop.add_reader(terminal, read)
     try:

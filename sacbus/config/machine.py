@@ -12,7 +12,7 @@ from typing import Final
 
 from sacbus.config.keys import Key
 from sacbus.config.mistake import ConfigError, Findings
-from sacbus.config.notation import HIGHEST_ADDRESS, LOWEST_ADDRESS
+from sacbus.config.notation import HIGHEST_ADDRESS
 from sacbus.config.source import Source, load
 from sacbus.config.table import Table, tables
 from sacbus.motion import Drive
@@ -23,8 +23,11 @@ __all__ = ["AXIS", "LETTERS", "MACHINE", "read_machine", "read_machine_source"]
 #: What axes are called in G-code.
 LETTERS: Final = ("X", "Y", "Z", "A", "B", "C", "U", "V", "W")
 
+#: Of a SAC, which is what moves an axis: 0 to 3 have other uses in its packets (manual).
+_LOWEST_NODE: Final = 4
+
 _DEFAULT: Final = Machine(())
-_AXIS: Final = Axis("X", LOWEST_ADDRESS, 1.0)
+_AXIS: Final = Axis("X", _LOWEST_NODE, 1.0)
 _DRIVE: Final = Drive()
 
 
@@ -91,7 +94,7 @@ AXIS: Final = (
     ),
     _count(
         "node",
-        LOWEST_ADDRESS,
+        _LOWEST_NODE,
         HIGHEST_ADDRESS,
         "address of the node that moves it; every axis its own",
         required=True,

@@ -8,6 +8,6 @@ Source: RS274/NGC interpreter, version 3 (NISTIR 6556); manual, "SAC and G-code"
 """
 
 from sacbus.gcode.mistake import GcodeError, Mistake
-from sacbus.gcode.reading import Survey, check_program, read_program
+from sacbus.gcode.reading import Checked, check_program, read_program
 
-__all__ = ["GcodeError", "Mistake", "Survey", "check_program", "read_program"]
+__all__ = ["Checked", "GcodeError", "Mistake", "check_program", "read_program"]

@@ -15,21 +15,21 @@ from typing import Final
 from sacbus.gcode.arc import Arc
 from sacbus.gcode.mistake import GcodeError, Mistake
 from sacbus.gcode.program import Program
-from sacbus.toolpath import Dwell, Halt, Machine, PathItem, Straight
+from sacbus.toolpath import MOST_STEPS, Dwell, Halt, Machine, PathItem, Straight
 
-__all__ = ["Survey", "check_program", "read_program"]
+__all__ = ["Checked", "check_program", "read_program"]
 
 MOST: Final = 20
 """Mistakes that are told at once: about a screen of them."""
 
 
 @dataclass(frozen=True, slots=True)
-class Survey:
-    """What a program comes to.
+class Checked:
+    """What a program comes to that nothing is wrong with.
 
     lines: read, up to the program's end. stretches: straight ones, chords of arcs included.
     length: mm of its path. dwell: s of standing still. halts: how many times somebody is told
-    something.
+    something; waits: how many of them wait for somebody.
     """
 
     lines: int
@@ -37,6 +37,7 @@ class Survey:
     length: float
     dwell: float
     halts: int
+    waits: int
 
 
 def read_program(
@@ -67,7 +68,7 @@ def check_program(
     *,
     skipping: bool = True,
     most: int = MOST,
-) -> Survey:
+) -> Checked:
     """Read a whole program and tell what it comes to, without working out a chord.
 
     Arguments as of ``read_program``. Raises GcodeError with all that is wrong with it, in the order
@@ -75,7 +76,7 @@ def check_program(
     """
     program = Program(machine, name, skipping=skipping)
     mistakes: list[Mistake] = []
-    number = stretches = halts = 0
+    number = stretches = halts = waits = 0
     length = dwell = 0.0
     place = (0.0,) * len(machine.axes)
     for number, text in enumerate(lines, 1):
@@ -90,6 +91,11 @@ def check_program(
             match element:
                 case Straight():
                     stretches += 1
+                    if (far := machine.too_far(place, element.to)) is not None:
+                        what = f"would go {far[1]:.0f} steps at once, {MOST_STEPS} at most"
+                        mistakes.append(
+                            Mistake(name, number, 1, far[0], what, "check units and steps per mm")
+                        )
                     length += math.dist(place, element.to)
                     place = element.to
                 case Arc():
@@ -100,8 +106,9 @@ def check_program(
                     dwell += element.seconds
                 case Halt():
                     halts += 1
+                    waits += element.waits
         if program.ended:
             break
     if mistakes:
         raise GcodeError(mistakes[:most])
-    return Survey(number, stretches, length, dwell, halts)
+    return Checked(number, stretches, length, dwell, halts, waits)

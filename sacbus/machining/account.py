@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from sacbus.gcode import Survey as Program
+from sacbus.gcode import Checked
 from sacbus.kernel import SECOND
 from sacbus.machining.course import Course
 from sacbus.machining.run import Machined
@@ -31,7 +31,7 @@ def clock(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-def account(name: str, program: Program, course: Course, machined: Machined) -> Iterator[str]:
+def account(name: str, program: Checked, course: Course, machined: Machined) -> Iterator[str]:
     """The lines that tell it."""
     survey, streamed = course.survey, machined.streamed
     yield (
@@ -112,7 +112,7 @@ def _mm(axis: Axis, steps: float) -> float:
     return _forward(axis, steps) / axis.steps_per_mm
 
 
-def as_json(name: str, program: Program, course: Course, machined: Machined) -> dict[str, object]:
+def as_json(name: str, program: Checked, course: Course, machined: Machined) -> dict[str, object]:
     """The same for programs; times in s, lengths in mm, positions in full steps as well."""
     survey, streamed = course.survey, machined.streamed
     told: dict[str, object] = {

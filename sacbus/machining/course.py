@@ -7,17 +7,12 @@ passes one by one, so a program may be of any length.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Final
 
 from sacbus.machining.listing import listing_of
 from sacbus.machining.trail import Trail
-from sacbus.toolpath import Block, Machine, PathItem, Straight, Survey, plan_path
+from sacbus.toolpath import MOST_STEPS, Block, Machine, PathItem, Straight, Survey, plan_path
 
 __all__ = ["Course", "TooFar"]
-
-#: Full steps of an axis in one stretch: how far the tool is off its path is worked out pulse by
-#: pulse, and 250 m at 400 steps a mm are more than any machine has.
-MOST_STEPS: Final = 100_000_000
 
 Point = tuple[float, ...]
 
@@ -75,10 +70,8 @@ class Course:
             yield item
 
     def _check(self, item: Straight) -> None:
-        for axis, come_from, to in zip(self.machine.axes, self.end, item.to, strict=True):
-            steps = abs(to - come_from) * axis.steps_per_mm
-            if not steps <= MOST_STEPS:
-                raise TooFar(
-                    f"line {item.line}: {axis.name} would go {steps:.0f} steps at once, "
-                    f"{MOST_STEPS} at most, check units and steps per mm"
-                )
+        if (far := self.machine.too_far(self.end, item.to)) is not None:
+            raise TooFar(
+                f"line {item.line}: {far[0]} would go {far[1]:.0f} steps at once, "
+                f"{MOST_STEPS} at most, check units and steps per mm"
+            )

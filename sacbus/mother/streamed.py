@@ -46,13 +46,14 @@ class Streamed:
         """How far, in words."""
         if not self.blocks:
             return "nothing had moved"
-        done = "done" if self.over else "begun"
         lines = f"lines {self.lines[0]} to {self.lines[1]}, " if self.lines[1] else ""
         at = ", ".join(f"{name} {steps}" for name, steps in self.positions.items())
-        return (
-            f"{self.blocks} blocks {done} after {self.moving / SECOND:.1f} s of motion, "
-            f"{lines}{'at' if self.over else 'on the way to'} {at} steps"
-        )
+        if not self.over:
+            # How much of the block's time is gone, nobody knows.
+            return f"in block {self.blocks}, {lines}on the way to {at} steps"
+        blocks = "block" if self.blocks == 1 else "blocks"
+        moving = self.moving / SECOND
+        return f"{self.blocks} {blocks} done after {moving:.1f} s of motion, {lines}at {at} steps"
 
 
 class WrongNode(MotherError):

@@ -12,7 +12,7 @@ from sacbus.toolpath.follow import COMMANDS_MAX, follow
 from sacbus.toolpath.jitter import Jitter, SideBySide, bresenham, side_by_side
 from sacbus.toolpath.law import Law, Phase
 from sacbus.toolpath.line import plan_line
-from sacbus.toolpath.machine import Axis, Machine
+from sacbus.toolpath.machine import MOST_STEPS, Axis, Machine
 from sacbus.toolpath.path import Dwell, Halt, PathItem, Straight
 from sacbus.toolpath.planner import plan_path
 from sacbus.toolpath.pulses import Pulses
@@ -20,6 +20,7 @@ from sacbus.toolpath.survey import Survey
 
 __all__ = [
     "COMMANDS_MAX",
+    "MOST_STEPS",
     "Axis",
     "AxisRun",
     "Block",

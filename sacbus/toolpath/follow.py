@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
+from math import inf
 from typing import Final
 
 from sacbus.motion import NO_RAMP, TICKS_PER_US, plan
@@ -39,10 +41,13 @@ _STEEPEST: Final = 998.0
 #: shorter one. Nobody can tell that a period runs out, but everybody waits for it.
 _LATE: Final = 30_000 * TICKS_PER_US
 
-
 #: Part of an axis's jump by which the law's velocities may differ that one command stands for: else
 #: two jumps of the law would become one.
 _ALIKE: Final = 0.25
+
+#: Part of an axis's jump by which it goes faster or slower than its share to be on time again: what
+#: a command cannot make good by then is left to the next one.
+_AHEAD: Final = 0.5
 
 
 def follow(
@@ -68,8 +73,8 @@ def follow(
     apart = _APART
     while True:
         commands = Commands(axis)
-        for sweep in found:
-            _Follower(axis, commands, sweep, apart, max(1, top100)).follow()
+        for sweep, following in zip_longest(found, found[1:]):
+            _Follower(axis, commands, sweep, following, apart, max(1, top100)).follow()
         commands.come_to_rest()
         if len(commands.motions) <= commands_max or apart > _USELESS:
             return commands.run(index, sum(steps))
@@ -79,11 +84,17 @@ def follow(
 class _Follower:
     """One sweep of an axis on its way to commands.
 
-    done: full steps of it that have theirs.
+    done: full steps of it that have theirs. following: the next sweep of the axis, if there is one.
     """
 
     def __init__(
-        self, axis: Axis, commands: Commands, sweep: Sweep, apart: float, top100: int
+        self,
+        axis: Axis,
+        commands: Commands,
+        sweep: Sweep,
+        following: Sweep | None,
+        apart: float,
+        top100: int,
     ) -> None:
         self._drive = axis.drive
         self._commands = commands
@@ -92,11 +103,16 @@ class _Follower:
         self._top100 = top100
         self._least_us = cycle_least(axis.drive, axis.max_rpm)
         self._done = 0
-        #: Velocities that are taken for one, in full steps a tick.
-        rpm = max(axis.jump, 1) * _ALIKE
-        self._alike = rpm * axis.drive.steps_per_rev / 60 / TICKS_PER_SECOND
+        # Full steps a tick.
+        jump = max(axis.jump, 1) * axis.drive.steps_per_rev / 60 / TICKS_PER_SECOND
+        #: Velocities that are taken for one, and how far they may be from those of the law.
+        self._alike, self._ahead = _ALIKE * jump, _AHEAD * jump
         #: Half a pulse, in full steps.
         self._half = 0.5 / axis.drive.m
+        #: When the last period is to be over: lest the next sweep begins late.
+        self._over = sweep.end + _LATE
+        if following is not None:
+            self._over = min(self._over, following.time(self._half))
 
     def follow(self) -> None:
         """Add the commands of the sweep."""
@@ -141,10 +157,20 @@ class _Follower:
         """
         while self._done < upto:
             steps = self._reach(upto, until)
-            ticks = max(self._due(steps, upto, until) - self._commands.next, 1.0)
+            ticks = self._borne(steps, self._due(steps, upto, until) - self._commands.next)
             for even in split(self._drive, steps, ticks, self._least_us, self._apart):
                 self._commands.even(even.steps, even.cycle_us)
             self._done += steps
+
+    def _borne(self, steps: int, ticks: float) -> float:
+        """The time in which some full steps are made, if they should be in ``ticks``.
+
+        An axis that is late or early by a step would make a jump of its own otherwise, when a
+        single step is all that it has to make it good.
+        """
+        slowest, fastest = self._sweep.pace(self._done, self._done + steps)
+        most = steps / (slowest - self._ahead) if slowest > self._ahead else inf
+        return min(max(ticks, steps / (fastest + self._ahead)), most)
 
     def _reach(self, upto: int, until: float | None) -> int:
         """How many full steps one velocity will do for."""
@@ -170,8 +196,9 @@ class _Follower:
         now, due = self._commands.next, self._due(steps, upto, until)
         if due <= now:
             return True
-        if due == sweep.end + _LATE and steps > 1:
-            return False
+        cut = sweep.steps + self._half - sweep.at(due) if due == self._over else 0.0
+        if cut > self._apart and steps > 1:
+            return False  # it would show; so the last step is a command of its own
         if sweep.spread(begin, begin + steps - 2 * self._half) > self._alike:
             return False
         # What it is off at its ends is given; only what comes in between is this velocity's fault.
@@ -192,7 +219,7 @@ class _Follower:
         if until is not None:
             return until
         if sweep.parts[-1].v1:
-            return min(sweep.time(upto + self._half), sweep.end + _LATE)
+            return min(sweep.time(upto + self._half), self._over)
         # It slows down to rest: the last pulse tells how long the steps take. Its period runs out
         # when it does, if that is not further from the end than half of it, nor much too late.
         pulses = steps * self._drive.m
@@ -203,7 +230,7 @@ class _Follower:
         part = 0.5 / pulses
         early = (sweep.end + now * part) / (1 + part)
         late = (sweep.end - now * part) / (1 - part)
-        return min(max(natural, early), late, sweep.end + _LATE)
+        return min(max(natural, early), late, self._over)
 
     def _best_time(self, place: float) -> float:
         """When a pulse is best issued where two pieces meet.

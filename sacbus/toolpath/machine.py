@@ -7,11 +7,17 @@ Source: spec, mother ("G-code": settings), command line (``sacbus gcode``).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from sacbus.motion import Drive
 
-__all__ = ["Axis", "Machine"]
+__all__ = ["MOST_STEPS", "Axis", "Machine"]
+
+#: Full steps of an axis in one stretch: how far the tool is off its path is worked out pulse by
+#: pulse, and 250 m at 400 steps a mm are more than any machine has.
+MOST_STEPS: Final = 100_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +60,14 @@ class Machine:
     feed: float = 300.0
     acceleration: float = 50.0
     tolerance: float = 0.01
+
+    def too_far(self, begin: Sequence[float], to: Sequence[float]) -> tuple[str, float] | None:
+        """The first axis that a straight way (mm) takes further than any goes, and its steps."""
+        for axis, since, until in zip(self.axes, begin, to, strict=True):
+            steps = abs(until - since) * axis.steps_per_mm
+            if not steps <= MOST_STEPS:  # nan is no way
+                return axis.name, steps
+        return None
 
     def axis(self, name: str) -> int | None:
         """Which axis has this name; None if there is none."""

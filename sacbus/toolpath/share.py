@@ -112,6 +112,17 @@ class Sweep:
                 slowest, fastest = min(slowest, part.v0), max(fastest, part.v0)
         return max(0.0, fastest - slowest)
 
+    def pace(self, place: float, until: float) -> tuple[float, float]:
+        """The lowest and the highest velocity between two places, in full steps a tick."""
+        first = max(0, bisect_right(self._places, place) - 1)
+        slowest, fastest = inf, 0.0
+        for part in self.parts[first:]:
+            if part.place >= until:
+                break
+            slowest = min(slowest, part.v0, part.v1)
+            fastest = max(fastest, part.v0, part.v1)
+        return slowest, fastest
+
     def between(self, place: float, until: float) -> Iterator[float]:
         """Places strictly between two at which the motion changes, or is half-way to that."""
         first = max(0, bisect_right(self._places, place) - 1)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from examples import relief
-from sacbus.gcode import GcodeError, Mistake, Survey, check_program, read_program
+from sacbus.gcode import Checked, GcodeError, Mistake, check_program, read_program
 from sacbus.gcode.vocabulary import GROUPS, REFUSED
 from sacbus.toolpath import Straight
 from tests.gcode.rig import MACHINE, items, machine
@@ -54,18 +54,29 @@ def test_whatever_is_written_is_read_or_refused(program: list[str]) -> None:
         assert stretches == check_program(program, MACHINE).stretches or len(came) == 1_000
 
 
-def test_a_survey_counts_what_reading_gives() -> None:
+def test_a_check_counts_what_reading_gives() -> None:
     program = "G1 X3 Y4\nG4 P1.5\nG0 Z5 M0\nG2 X13 I5\nS5 M3\nM30\nG1 X0\n"
-    survey = check_program(program.splitlines(), MACHINE)
+    checked = check_program(program.splitlines(), MACHINE)
     came = items(program)
-    assert survey.lines == 6
-    assert survey.stretches == sum(isinstance(item, Straight) for item in came)
-    assert survey.length == pytest.approx(5 + 5 + 5 * 3.14159, abs=1e-3)
-    assert (survey.dwell, survey.halts) == (1.5, 3)
+    assert checked.lines == 6
+    assert checked.stretches == sum(isinstance(item, Straight) for item in came)
+    assert checked.length == pytest.approx(5 + 5 + 5 * 3.14159, abs=1e-3)
+    assert (checked.dwell, checked.halts, checked.waits) == (1.5, 3, 1)
+
+
+def test_a_stretch_that_no_machine_has_is_a_mistake_before_anything_moves() -> None:
+    with pytest.raises(GcodeError) as refused:
+        check_program(["G1 X1 F5", "X99999999", "G1 Q1"], MACHINE, "part.ngc")
+    first, second = map(str, refused.value.mistakes)
+    assert first.startswith("X: would go ")
+    assert first.endswith(
+        " steps at once, 100000000 at most, part.ngc:2:1, check units and steps per mm"
+    )
+    assert second.startswith("Q1: ")
 
 
 def test_an_empty_program_comes_to_nothing() -> None:
-    assert check_program([], MACHINE) == Survey(0, 0, 0.0, 0.0, 0)
+    assert check_program([], MACHINE) == Checked(0, 0, 0.0, 0.0, 0, 0)
     assert items("") == []
 
 

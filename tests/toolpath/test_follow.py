@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -106,6 +107,37 @@ def test_an_axis_that_stands_still_meanwhile_waits() -> None:
     assert [motion.steps for motion in run.motions] == [30, 30]
     assert run.motions[1].wait_us > 200_000
     assert off(axis(), run, [30, 0, 30], law) < 0.01
+
+
+@pytest.mark.slow
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([-40, -9, -2, -1, 0, 1, 2, 9, 40]), st.floats(0.5, 33)),
+        min_size=1,
+        max_size=8,
+    ),
+    st.sampled_from([0, 3]),
+)
+@example([(1, 2.2), (-10, 72.0)], 3)
+@example([(1, 2.2), (-10, 72.0)], 0)
+@example([(-1, 13.0), (16, 180.0)], 0)
+def test_no_step_comes_much_sooner_than_the_law_has_steps(
+    moves: list[tuple[int, float]], u: int
+) -> None:
+    of, steps = axis(ustep=u), [count for count, _ in moves]
+    law = tuple(
+        Phase(at, 0.0, 1.0, max(abs(count), 1) / per_second, 1.0, 1.0)
+        for at, (count, per_second) in enumerate(moves)
+    )
+    run = follow(of, 0, steps, law)
+    if run is None:
+        return
+    periods = np.diff(Pulses(of, run).times(0, run.end))
+    # What an axis is late by is not made good by a single quick step: half a jump is the most.
+    jump = of.jump * of.drive.steps_per_rev / 60
+    fastest = max(per_second for count, per_second in moves if count) + jump / 2
+    assert not periods.size or periods.min() * fastest * of.drive.m >= 0.97 * TICKS_PER_SECOND
 
 
 def test_a_reversal_is_another_command_the_other_way() -> None:
