@@ -21,7 +21,7 @@ from sacbus.toolpath.law import Law, Phase
 from sacbus.toolpath.machine import Axis, Machine
 from sacbus.toolpath.share import TICKS_PER_SECOND
 
-__all__ = ["LINEAR_PERIOD", "line_law", "plan_line", "top_speed"]
+__all__ = ["CRUISE", "LINEAR_PERIOD", "line_law", "plan_line", "top_speed"]
 
 LINEAR_PERIOD: Final = 104
 """Ticks of the shortest pulse of a ramp: 52 us to compute it (manual, "Discussion"), which is more
@@ -29,7 +29,7 @@ than the 40 us in which the next command must be loaded to keep the velocity."""
 
 #: Part of a line that is run at constant velocity, at least. A triangle would be 0.6 % quicker, but
 #: ramps that are not exact need a stretch in which to meet.
-_CRUISE: Final = 0.2
+CRUISE: Final = 0.2
 
 #: Parts by which velocity and acceleration may be lowered to fit better.
 _SLOWER: Final = 0.03
@@ -200,7 +200,7 @@ def _speed(
             f"{slowest.axis.name} makes {top_speed(slowest.axis):.0f} steps/s at most",
         ),
         (
-            sqrt((1 - _CRUISE) * acceleration * length),
+            sqrt((1 - CRUISE) * acceleration * length),
             "the line is too short for its acceleration",
         ),
     ]
@@ -244,7 +244,7 @@ def _fitting_acceleration(
 ) -> float:
     """An acceleration a little below at which those of all axes are nearly whole hundredths."""
     ramps: list[tuple[float, float]] = []
-    gentlest = max(1 - _GENTLER, speed**2 / acceleration / length / (1 - _CRUISE / 2))
+    gentlest = max(1 - _GENTLER, speed**2 / acceleration / length / (1 - CRUISE / 2))
     for mover in movers:
         drive = mover.axis.drive
         velocity = speed * mover.per_mm

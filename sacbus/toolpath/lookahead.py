@@ -24,6 +24,7 @@ from typing import Final
 
 from sacbus.toolpath.corner import Corner
 from sacbus.toolpath.law import Law, Phase
+from sacbus.toolpath.line import CRUISE
 from sacbus.toolpath.machine import Axis
 from sacbus.toolpath.stretch import Stretch, jump_of
 
@@ -239,7 +240,10 @@ class _Paces:
         """The highest velocity of a hump."""
         stretch = self.block[i]
         slower = self.entry[i] ** 2 + self.leave[i] ** 2
-        reached = sqrt(stretch.acceleration * stretch.length + slower / 2)
+        ramps = stretch.length
+        if not (self.entry[i] and self.leave[i]):
+            ramps *= 1 - CRUISE
+        reached = sqrt(stretch.acceleration * ramps + slower / 2)
         return max(self.entry[i], self.leave[i], min(_top(stretch, self.cap), reached))
 
     def _ramp(self, i: int, slow: float, fast: float) -> float:

@@ -48,11 +48,12 @@ def test_a_long_line_is_a_trapezoid() -> None:
     assert [phase.seconds for phase in law] == pytest.approx([up, (10 - up * 0.5) / 0.5, up])
 
 
-def test_a_line_too_short_for_its_feed_is_a_triangle() -> None:
+def test_a_line_too_short_for_its_feed_leaves_a_fifth_for_its_ramps_to_meet_in() -> None:
     ((stretch,), _) = through((0.05, 0, 0))
     law = law_of(XYZ.axes, [stretch], [])
-    assert len(law) == 2
-    assert law[0].v1 == law[1].v0 == pytest.approx(sqrt(0.05 * 25 / 2 / pi))
+    assert len(law) == 3
+    assert law[1].end - law[1].begin == pytest.approx(0.2)
+    assert law[0].v1 == law[1].v0 == law[2].v0 == pytest.approx(sqrt(0.8 * 0.05 * 25 / 2 / pi))
 
 
 def test_a_few_steps_are_run_at_the_velocity_of_a_start() -> None:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sacbus.motion import TICKS_PER_US, Drive, load_ticks
+from sacbus.motion import NO_RAMP, TICKS_PER_US, Drive, load_ticks
 from sacbus.toolpath import Axis, Block, Dwell, Halt, Machine, PathItem, Straight, Survey, plan_path
 from sacbus.toolpath.corner import Corner
 from sacbus.toolpath.piece import Piece
@@ -115,6 +115,18 @@ def test_a_zigzag_of_tiny_ways_needs_no_rest_at_its_corners() -> None:
     blocks = planned(straights(zigzag(40, 0.02, 0.01)), join_steps=-1)
     assert len(blocks) < 10
     assert moved(blocks) == (0, 160, 0)
+
+
+def test_a_way_too_short_for_its_feed_gathers_speed_by_ramps_however_many_points_it_has() -> None:
+    # Its ramps meet in the middle. The point by the way makes it a stretch of a path, not a line.
+    axes = (Axis("X", 10, 400, max_rpm=600, drive=Drive(ustep=3)), Axis("Y", 11, 400))
+    bent = Machine(axes, acceleration=20)
+    for steps in range(3235, 3250):
+        way = [Straight((4.0, 0.0004), 400, 1), Straight((steps / 400, 0.0), 400, 2)]
+        (block,) = planned(way, bent)
+        (run,) = block.runs
+        assert run.motions[0].acc100 < NO_RAMP
+        assert run.motions[-1].dec100 < 99_800
 
 
 # ------------------------------------------------------------------------ properties
