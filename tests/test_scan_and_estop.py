@@ -24,6 +24,12 @@ def bus() -> Iterator[Sacbus]:
         yield sacbus
 
 
+@pytest.fixture(scope="module")
+def modules() -> Iterator[Sacbus]:
+    with served("--ephemeral", "--kind", "ss-mst67", "--nodes", "4-6", "--baud", "9600") as sacbus:
+        yield sacbus
+
+
 def test_scan_prints_who_answers_and_how_soon(capsys: Captured, bus: Sacbus) -> None:
     assert run(["scan", bus.link, "--nodes", "10,84-86"]) == 0
     written = capsys.readouterr()
@@ -110,3 +116,19 @@ def test_what_estop_puts_on_the_line_is_s_three_times(tmp_path: Path) -> None:
         with client(str(port)) as listening:
             assert run(["estop", url]) == 0
             assert listening.read(21) == bytes.fromhex("02 00 01 53 03 39 00") * 3
+
+
+@pytest.mark.parametrize("command", [["estop"], ["scan", "--nodes", "4-6"], ["send"]])
+def test_a_bus_of_another_protocol_is_refused_before_a_byte_goes_out(
+    capsys: Captured, modules: Sacbus, command: list[str]
+) -> None:
+    line = ["4S"] if command == ["send"] else []
+    assert run([command[0], modules.link, *command[1:], *line]) == 1
+    assert capsys.readouterr().err == (
+        "error: this line speaks superstepper, to which a SAC's commands mean something else, "
+        f"{modules.link}, take a master of that protocol: nothing was sent\n"
+    )
+    assert run(["ss", modules.link, "4", "status", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    # Bytes of a SAC's would have moved it, or cut this question in two.
+    assert (told["framing_error"], told["overrun"], told["status"]["busy"]) == (False,) * 3

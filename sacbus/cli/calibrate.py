@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
+from sacbus.cli.mothers_line import mothers_line
 from sacbus.cli.options import baud, verbose
 from sacbus.cli.outcomes import failures, told
 
@@ -94,9 +95,9 @@ async def _calibrate(
     soft_ops: bool,
     progress: Callable[[float], object],
 ) -> Calibration:
-    from sacbus.mother import Mother, calibrate
+    from sacbus.mother import calibrate
 
-    async with Mother.connect(link, baud=baud) as mother:
+    async with mothers_line(link, baud) as mother:
         return await calibrate(
             mother,
             node,

@@ -7,6 +7,7 @@ import json
 
 import click
 
+from sacbus.cli.mothers_line import mothers_line
 from sacbus.cli.options import baud, verbose
 
 __all__ = ["estop_command"]
@@ -23,8 +24,8 @@ def estop_command(link: str, baud: int, as_json: bool) -> int:
     LINK is the path of a serial port or of a bus's pty, socket://host:port or rfc2217://host:port.
     Nobody answers a broadcast: status 0 says that it was sent. A port that another program has
     cannot be had: stop that program, or have a link of its own for this. It is no substitute for a
-    switch that takes the power away. It speaks SAC: on a line of another protocol its bytes mean
-    something else, and need stop nothing.
+    switch that takes the power away. It speaks SAC: a bus here that speaks another protocol is
+    refused, on any other line its bytes mean something else to nodes that are no SACs.
 
     \b
     Example: sacbus estop /tmp/sacbus
@@ -39,8 +40,6 @@ def estop_command(link: str, baud: int, as_json: bool) -> int:
 
 
 async def _estop(link: str, baud: int) -> int:
-    from sacbus.mother import Mother
-
-    async with Mother.connect(link, baud=baud) as mother:
+    async with mothers_line(link, baud) as mother:
         await mother.estop()
         return mother.statistics[0].sent

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final, Self
 
 import click
 
+from sacbus.cli.mothers_line import check_spoken
 from sacbus.cli.options import USAGE_STATUS, WrongInput, baud, verbose
 from sacbus.cli.part_program import STANDARD, PartProgram
 from sacbus.cli.recordings import (
@@ -174,6 +175,8 @@ def gcode_command(
     )
     refuse_missing_directories(outputs)
     form = "" if picture is None else picture_form(picture)
+    if link is not None:
+        asyncio.run(check_spoken(link))
     with ExitStack() as stack:
         program = stack.enter_context(PartProgram.opened(file))
         checked = _checked(program, machine)

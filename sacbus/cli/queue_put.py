@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
+from sacbus.cli.mothers_line import mothers_line
 from sacbus.cli.options import WrongInput, baud, verbose
 from sacbus.cli.outcomes import failures, told
 from sacbus.cli.rows import Rows, opened_rows, shown_progress
@@ -117,12 +118,12 @@ class _Wanted:
 
 
 def _put(wanted: _Wanted, *, save: bool) -> dict[str, object]:
-    from sacbus.mother import Mother, put_queue
+    from sacbus.mother import put_queue
 
     rows = list(wanted.rows)
 
     async def put(progress: Callable[[int], object]) -> None:
-        async with Mother.connect(wanted.link, baud=wanted.baud) as mother:
+        async with mothers_line(wanted.link, wanted.baud) as mother:
             await put_queue(
                 mother, wanted.node, rows, defaults=wanted.defaults, save=save, progress=progress
             )
@@ -134,13 +135,13 @@ def _put(wanted: _Wanted, *, save: bool) -> dict[str, object]:
 
 def _stream(wanted: _Wanted, *, gap: bool, drift_ppm: int) -> dict[str, object]:
     from sacbus.kernel import SECOND
-    from sacbus.mother import Mother, MotherError, QueueStream
+    from sacbus.mother import MotherError, QueueStream
 
     at, stopped = 0, False
 
     async def stream(progress: Callable[[int], object]) -> dict[str, object]:
         nonlocal at, stopped
-        async with Mother.connect(wanted.link, baud=wanted.baud) as mother:
+        async with mothers_line(wanted.link, wanted.baud) as mother:
             stream = QueueStream(
                 mother,
                 wanted.node,
@@ -187,5 +188,7 @@ def _words(node: int, report: dict[str, object]) -> str:
     rows = report["rows"]
     if not report["streamed"]:
         saved = ", and saved to its EEPROM" if report["saved"] else ""
-        return f"{rows} positions written to node {node}{saved}"
-    return f"node {node} has run {rows} rows, {report['seconds']:.3f} s"
+        what = "position" if rows == 1 else "positions"
+        return f"{rows} {what} written to node {node}{saved}"
+    what = "row" if rows == 1 else "rows"
+    return f"node {node} has run {rows} {what}, {report['seconds']:.3f} s"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sacbus.cli.mothers_line import mothers_line
 from sacbus.cli.options import NO_ANSWER_STATUS, baud, read_addresses, verbose
 
 if TYPE_CHECKING:
@@ -80,9 +81,7 @@ def _check(nodes: tuple[int, ...]) -> None:
 
 
 async def _scan(link: str, nodes: tuple[int, ...], baud: int) -> list[Acknowledged]:
-    from sacbus.mother import Mother
-
-    async with Mother.connect(link, baud=baud) as mother:
+    async with mothers_line(link, baud) as mother:
         if not sys.stderr.isatty():
             return await mother.scan(nodes)
         try:

@@ -7,6 +7,7 @@ import json
 
 import click
 
+from sacbus.cli.mothers_line import mothers_line
 from sacbus.cli.options import baud, verbose
 from sacbus.cli.outcomes import told
 
@@ -62,9 +63,7 @@ def send_command(link: str, line: str, baud: int, accept_duplicates: bool, as_js
 async def _send(
     link: str, node: int, command: str, baud: int, accept_duplicates: bool
 ) -> dict[str, object]:
-    from sacbus.mother import Mother
-
-    async with Mother.connect(link, baud=baud) as mother:
+    async with mothers_line(link, baud) as mother:
         if node == 0:
             await mother.broadcast(command)
             return {"outcome": "broadcast", "attempts": 1, "round_trip_us": None}

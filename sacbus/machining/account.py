@@ -20,6 +20,9 @@ __all__ = ["account", "as_json", "clock"]
 #: Reports of nodes that are told.
 TOLD: Final = 5
 
+#: How many times as long as asked for a program takes before it is told why.
+SLOW: Final = 1.2
+
 
 def clock(seconds: float) -> str:
     """``3 h 12 min``, ``4 min 12 s``, ``12.345 s``."""
@@ -35,7 +38,8 @@ def account(name: str, program: Checked, course: Course, machined: Machined) -> 
     """The lines that tell it."""
     survey, streamed = course.survey, machined.streamed
     yield (
-        f"{name}: {program.lines} lines, {program.stretches} straight stretches, "
+        f"{name}: {_counted(program.lines, 'line')}, "
+        f"{_counted(program.stretches, 'straight stretch', 'straight stretches')}, "
         f"{program.length:.3f} mm of path"
     )
     yield _time(course, streamed)
@@ -57,6 +61,11 @@ def account(name: str, program: Checked, course: Course, machined: Machined) -> 
         yield f"dwells     {survey.dwell:g} s"
 
 
+def _counted(count: int, one: str, many: str | None = None) -> str:
+    """``1 block``, ``2 blocks``."""
+    return f"{count} {one if count == 1 else many or one + 's'}"
+
+
 def _time(course: Course, streamed: Streamed | None) -> str:
     asked = f"{clock(course.survey.asked)} at the feeds asked for"
     if streamed is None:
@@ -69,7 +78,7 @@ def _time(course: Course, streamed: Streamed | None) -> str:
 
 def _commands(course: Course, machined: Machined) -> str:
     survey, streamed = course.survey, machined.streamed
-    told = f"commands   {survey.commands} in {survey.blocks} blocks"
+    told = f"commands   {survey.commands} in {_counted(survey.blocks, 'block')}"
     if streamed is not None:
         told += f", {streamed.packets} packets; {streamed.deepest} of 30 queue positions used"
     return told
@@ -78,11 +87,17 @@ def _commands(course: Course, machined: Machined) -> str:
 def _feed(course: Course) -> Iterator[str]:
     survey = course.survey
     if not survey.reasons:
-        yield "feed       as asked for"
-        return
-    yield f"feed       lowered by up to {100 * survey.lowered:.1f} %:"
+        yield "feed       as asked for, but for corners and ramps"
+    else:
+        yield f"feed       lowered by up to {100 * survey.lowered:.1f} %:"
     for reason, blocks in survey.reasons.items():
-        yield f"             in {blocks} blocks, {reason}"
+        yield f"             in {_counted(blocks, 'block')}, {reason}"
+    if survey.planned > SLOW * survey.asked:
+        yield (
+            f"             {survey.planned / survey.asked:.1f} times as long as at the feeds asked "
+            "for: what is not told above is lost at corners and in ramps, where a higher "
+            "jump_rpm or acceleration (--machine) would help"
+        )
 
 
 def _deviation(course: Course) -> str:

@@ -38,7 +38,7 @@ from sacbus.mother.statistics import NodeStatistics
 from sacbus.mother.streamed import StreamBroken, Streamed, WrongNode
 
 if TYPE_CHECKING:
-    from sacbus.mother.calibration import Calibration, NoSoftOp, calibrate
+    from sacbus.mother.calibration import Calibration, NoSoftOp, Unlikely, calibrate
     from sacbus.mother.group import Group, GroupMotion, GroupRun, Member
     from sacbus.mother.queue_stream import LostTrack, QueueStream
     from sacbus.mother.stream import Stream
@@ -76,6 +76,7 @@ __all__ = [
     "StreamBroken",
     "Streamed",
     "UnknownOutcome",
+    "Unlikely",
     "WrongNode",
     "addressed_line",
     "calibrate",
@@ -95,6 +96,7 @@ _HOMES: Final = {
     "LostTrack": "queue_stream",
     "Member": "group",
     "NoSoftOp": "calibration",
+    "Unlikely": "calibration",
     "QueueStream": "queue_stream",
     "Stream": "stream",
     "calibrate": "calibration",

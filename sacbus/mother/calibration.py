@@ -32,7 +32,7 @@ from sacbus.motion import TICKS_PER_US, Drive, plan
 if TYPE_CHECKING:
     from sacbus.mother.mother import Mother
 
-__all__ = ["RPMS", "Calibration", "NoSoftOp", "calibrate"]
+__all__ = ["RPMS", "Calibration", "NoSoftOp", "Unlikely", "calibrate"]
 
 #: What the companion offers; any other will do.
 RPMS: Final = (5, 20, 60, 160)
@@ -52,6 +52,9 @@ _WAIT_US: Final = 50_000
 _OFF: Final = 10
 _LATE: Final[Ns] = 2 * SECOND
 
+#: No oscillator is off by more than a fifth: an RC oscillator without any tuning is by a tenth.
+_LIKELY: Final = 5
+
 #: Ramps of velocities above slow, 1 RPM a step: the factory's.
 _RAMP100: Final = 100
 
@@ -69,6 +72,18 @@ class NoSoftOp(MotherError, TimeoutError):
         super().__init__(
             f"node {node}: expected it to tell of the {what} of its motion, got nothing within "
             f"{waited / SECOND:.1f} s; see that nothing else drives or stops it, and try again"
+        )
+
+
+class Unlikely(MotherError):
+    """What was measured is no oscillator's error."""
+
+    def __init__(self, node: int, planned: Ns, took: Ns) -> None:
+        self.node = node
+        super().__init__(
+            f"node {node}: {planned / SECOND:.3f} s of motion took {took / SECOND:.3f} s, expected "
+            "an oscillator to be off by a fifth at most; see that the settings given are the "
+            "node's, and that its bus runs in real time (serve without --speed)"
         )
 
 
@@ -117,7 +132,7 @@ async def calibrate(
 
     ``progress`` is called now and then with the part that is done, 0 to 1. Whatever ends it early,
     a cancelled call too, the node is stopped with S. Raises :class:`NoSoftOp`,
-    :class:`BadRequest`, and what :meth:`Mother.send` does.
+    :class:`Unlikely`, :class:`BadRequest`, and what :meth:`Mother.send` does.
     """
     drive = drive or Drive()
     line, motion = _command(rpm, seconds, drive)
@@ -147,6 +162,7 @@ async def calibrate(
     finally:
         listeners.remove(heard.take)
     await mother.send(node, switch_back)
+    _check_likely(node, planned, ended - begun)
     return _worked_out(node, motion, drive, ended - begun)
 
 
@@ -180,6 +196,12 @@ def _command(rpm: int, seconds: float, drive: Drive) -> tuple[str, Motion]:
     )
     session = Session.start(Defaults(sprf=drive.steps_per_rev))
     return ThrowAway(move).text(), session.resolve(move)[0]
+
+
+def _check_likely(node: int, planned: Ns, took: Ns) -> None:
+    """Refuse to make an oscillator's error of what cannot be one."""
+    if not planned * (_LIKELY - 1) <= took * _LIKELY <= planned * (_LIKELY + 1):
+        raise Unlikely(node, planned, took)
 
 
 def _duration(motion: Motion, drive: Drive) -> Ns:

@@ -47,7 +47,8 @@ class _Unanswered(MotherError):
         self.attempts = attempts
         self.last = last
         times = "once" if attempts == 1 else f"{attempts} times"
-        super().__init__(f"node {node}: {line!r} sent {times}, last answer {last}: {self.verdict}")
+        what = repr(line) if line else "the empty line"
+        super().__init__(f"node {node}: {what} sent {times}, last answer {last}: {self.verdict}")
 
 
 class Refused(_Unanswered):

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from math import inf
 from typing import Final, NamedTuple
 
-from sacbus.motion import TICKS_PER_US
 from sacbus.toolpath import lowered
 from sacbus.toolpath.block import AxisRun, Block
 from sacbus.toolpath.corner import Corner
@@ -22,14 +21,13 @@ from sacbus.toolpath.law import Law
 from sacbus.toolpath.line import plan_line
 from sacbus.toolpath.lookahead import has_room, law_of, worth_a_rest
 from sacbus.toolpath.machine import Machine
+from sacbus.toolpath.share import TICKS_PER_SECOND
 from sacbus.toolpath.stretch import Stretch
 
 __all__ = ["Origin", "block_of"]
 
 PACKETS_MORE: Final = 2
 """Packets of a block besides its commands: the barrier behind it, and ``y``."""
-
-TICKS_PER_SECOND: Final = TICKS_PER_US * 1_000_000
 
 SLOWER: Final = 0.98
 """A block that is still too fast for the line comes down by 2 % at least: it gets there."""

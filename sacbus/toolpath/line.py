@@ -18,7 +18,7 @@ from sacbus.toolpath.climb import leaning
 from sacbus.toolpath.deviation import deviation
 from sacbus.toolpath.follow import COMMANDS_MAX, follow
 from sacbus.toolpath.law import Law, Phase
-from sacbus.toolpath.machine import Axis, Machine
+from sacbus.toolpath.machine import MOST_STEPS, Axis, Machine
 from sacbus.toolpath.share import TICKS_PER_SECOND
 
 __all__ = ["CRUISE", "LINEAR_PERIOD", "line_law", "plan_line", "top_speed"]
@@ -88,8 +88,10 @@ def plan_line(
 
     steps: signed full steps of every axis of the machine, not all 0. feed: mm/min along the line;
     None: at the rapid rate. line: of its source. commands_max: of an axis, 3 at least. ValueError
-    where nothing moves.
+    where nothing moves, and for what is no such line. The work is in proportion to the steps: every
+    pulse is looked at, some two million a second.
     """
+    _check(machine, steps, feed)
     movers, length = _movers(machine, steps)
     asked = (machine.rapid if feed is None else feed) / 60
     acceleration = _acceleration(movers, length, asked)
@@ -102,6 +104,21 @@ def plan_line(
         again = _plan(machine, steps, movers, length, asked, gently, commands_max)
         best = min(best, again, key=lambda block: block.deviation.steps)
     return replace(best, lines=(line, line))
+
+
+def _check(machine: Machine, steps: Sequence[object], feed: float | None) -> None:
+    """Refuse what is no line of this machine."""
+    if len(steps) != len(machine.axes):
+        raise ValueError(
+            f"steps of a line: expected {len(machine.axes)}, one for each axis, got {len(steps)}"
+        )
+    for axis, one in zip(machine.axes, steps, strict=True):
+        if not isinstance(one, int) or abs(one) > MOST_STEPS:
+            raise ValueError(
+                f"steps of {axis.name}: expected a whole number up to {MOST_STEPS}, got {one!r}"
+            )
+    if feed is not None and not feed > 0:
+        raise ValueError(f"feed of a line: expected mm/min above 0, got {feed}")
 
 
 def _plan(

@@ -82,21 +82,21 @@ def law_of(
     return tuple(phase for i in range(len(block)) for phase in paces.phases(i))
 
 
-def worth_a_rest(block: Sequence[Stretch], law: Law, cap: float = inf) -> int | None:
+def worth_a_rest(block: Sequence[Stretch], law: Law) -> int | None:
     """The first stretch that would be over so much sooner between two rests that they pay."""
     seconds = [0.0] * len(block)
     for phase in law:
         seconds[phase.segment] += phase.seconds
     for i, stretch in enumerate(block):
-        if seconds[i] > REST_SECONDS and seconds[i] > _alone(stretch, cap) + REST_SECONDS:
+        if seconds[i] > REST_SECONDS and seconds[i] > _alone(stretch) + REST_SECONDS:
             return i
     return None
 
 
-def _alone(stretch: Stretch, cap: float) -> float:
+def _alone(stretch: Stretch) -> float:
     """Seconds that a stretch takes from rest to rest."""
-    top, acceleration, length = _top(stretch, cap), stretch.acceleration, stretch.length
-    if not has_room(stretch, cap):
+    top, acceleration, length = _top(stretch), stretch.acceleration, stretch.length
+    if not has_room(stretch):
         return length / min(top, stretch.start)
     if top * top > acceleration * length:
         return 2 * sqrt(length / acceleration)

@@ -6,12 +6,10 @@ Source: spec, mother ("G-code": "lowers the feed to what the line carries and re
 
 from __future__ import annotations
 
-from sacbus.motion import TICKS_PER_US
 from sacbus.toolpath.block import Block, Deviation
+from sacbus.toolpath.share import TICKS_PER_SECOND
 
 __all__ = ["Survey"]
-
-_TICKS_PER_SECOND = TICKS_PER_US * 1_000_000
 
 
 class Survey:
@@ -56,7 +54,7 @@ class Survey:
         self.blocks += 1
         self.length += block.length
         self.asked += block.asked
-        self.planned += block.duration / _TICKS_PER_SECOND
+        self.planned += block.duration / TICKS_PER_SECOND
         self.dwell += block.dwell
         for run in block.runs:
             self.commands += len(run.motions)

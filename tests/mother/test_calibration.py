@@ -10,7 +10,7 @@ import pytest
 from sacbus import Mother
 from sacbus.kernel import SECOND
 from sacbus.mother import BadRequest, LineLost, NoAnswer, Stopped
-from sacbus.mother.calibration import RPMS, NoSoftOp, calibrate
+from sacbus.mother.calibration import RPMS, NoSoftOp, Unlikely, calibrate
 from sacbus.motion import Drive
 from sacbus.testing import VirtualBus
 from sacbus.wire.times import MOTHER_GAP
@@ -126,13 +126,21 @@ async def test_cancelled_it_stops_the_node_and_switches_soft_ops_off(
     assert mother.caller.soft_op_listeners == []
 
 
-async def test_a_node_that_is_stopped_meanwhile_tells_of_its_end_too_early(
+async def test_a_node_that_is_stopped_meanwhile_is_not_taken_for_a_quick_one(
     bus: VirtualBus, mother: Mother
 ) -> None:
     call = asyncio.create_task(calibrate(mother, 10, rpm=60))
     await asyncio.sleep(20)
     await mother.send(10, "S")
-    assert (await call).factor < 0.4
+    with pytest.raises(Unlikely, match=r"60\.601 s of motion took 19\.\d+ s, expected an osc"):
+        await call
+    assert "soft_ops       0" in bus.node(10).type("cf\r")
+
+
+@pytest.mark.sacbus(nodes={10: {"ppm": 100_000}})
+async def test_an_oscillator_may_be_off_by_a_tenth(bus: VirtualBus, mother: Mother) -> None:
+    found = await calibrate(mother, 10, rpm=60, seconds=2)
+    assert found.clock_ppm == pytest.approx(100_000, abs=10)
 
 
 async def test_a_node_that_goes_silent_is_waited_for_no_longer_than_its_time(

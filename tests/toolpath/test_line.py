@@ -46,6 +46,22 @@ def test_of_random_lines_99_in_100_stay_within_a_step_and_the_rest_say_why() -> 
     assert len(far) <= LINES / 100, far
 
 
+@pytest.mark.parametrize(
+    ("steps", "feed", "told"),
+    [
+        ((1,), 60.0, "steps of a line: expected 2, one for each axis, got 1"),
+        ((1, 2.5), 60.0, "steps of Y: expected a whole number up to 100000000, got 2.5"),
+        ((10**9, 1), 60.0, "steps of X: expected a whole number up to 100000000, got 1000000000"),
+        ((1, 2), 0.0, "feed of a line: expected mm/min above 0, got 0.0"),
+        ((1, 2), float("nan"), "feed of a line: expected mm/min above 0, got nan"),
+    ],
+)
+def test_what_is_no_line_is_refused(steps: tuple[int, ...], feed: float, told: str) -> None:
+    machine = Machine((Axis("X", 10, 100), Axis("Y", 11, 100)))
+    with pytest.raises(ValueError, match=f"^{told}$"):
+        plan_line(machine, steps, feed)
+
+
 seeds = st.integers(0, 2**32)
 
 
