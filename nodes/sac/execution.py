@@ -361,7 +361,7 @@ def shortest(motion: Motion, defaults: Defaults) -> str:
     Its velocity in RPM where that gives this very cycle, as ``v100`` gives 3000 us.
     """
     rpm = motion.rpm
-    by_rpm = rpm > 0 and defaults.cycle_of(rpm) == motion.cycle_us
+    by_rpm = defaults.says(rpm, motion.cycle_us)
     return Move(
         steps=motion.steps,
         opposite=not motion.cw,

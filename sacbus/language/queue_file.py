@@ -74,7 +74,7 @@ class QueueRow:
         pulses, wait and sync start clear with every command and are left out when they are.
         """
         motion = self.motion
-        by_rpm = motion.rpm > 0 and defaults.cycle_of(motion.rpm) == motion.cycle_us
+        by_rpm = defaults.says(motion.rpm, motion.cycle_us)
         return Move(
             motion.steps,
             opposite=motion.cw is not defaults.cw,

@@ -74,6 +74,10 @@ class Defaults:
         """RPM of a cycle >= 1 us, truncated: 4567 gives 65 (manual, "V")."""
         return _US_PER_MINUTE // (self.sprf * cycle_us)
 
+    def says(self, rpm: int, cycle_us: int) -> bool:
+        """Whether V with this RPM says this very cycle, as v100 says 3000 us; else VC has to."""
+        return rpm > 0 and self.cycle_of(rpm) == cycle_us
+
     def acc_of(self, *, linear: bool) -> int:
         """System acceleration of a ramp, in hundredths."""
         return self.linear_acc100 if linear else self.acc100

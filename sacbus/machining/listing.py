@@ -34,7 +34,7 @@ def listing_of(block: Block, number: int, machine: Machine) -> Iterator[str]:
 
 def _command(motion: Motion, defaults: Defaults) -> str:
     """With every value that a session could change."""
-    by_rpm = motion.rpm > 0 and defaults.cycle_of(motion.rpm) == motion.cycle_us
+    by_rpm = defaults.says(motion.rpm, motion.cycle_us)
     return Move(
         steps=motion.steps,
         opposite=motion.cw is not defaults.cw,

@@ -94,8 +94,6 @@ class Caller:
         #: The emergency stop that is under way, and who waits for its end.
         self._stop: EmergencyStop | None = None
         self._stopping: list[Done] = []
-        #: Emergency stops so far, for those who drive nodes and were not waiting when one came.
-        self.stops = 0
         self._lost: LineLost | None = None
         self.statistics: defaultdict[int, NodeStatistics] = defaultdict(NodeStatistics)
         #: Packets of others, answers that nobody waits for, and line faults, counted.

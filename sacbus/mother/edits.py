@@ -92,7 +92,7 @@ def _changes(motion: Motion, before: Motion, defaults: Defaults) -> list[Edit]:
 
 def _velocity(motion: Motion, defaults: Defaults) -> Edit:
     """As RPM where that gives this very cycle, as v100 gives 3000 us."""
-    by_rpm = motion.rpm > 0 and defaults.cycle_of(motion.rpm) == motion.cycle_us
+    by_rpm = defaults.says(motion.rpm, motion.cycle_us)
     return Edit(rpm=motion.rpm) if by_rpm else Edit(cycle_us=motion.cycle_us)
 
 
