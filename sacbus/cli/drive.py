@@ -20,55 +20,59 @@ _F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command ha
 _BYTE: Final = 255
 
 
-def drive_options(command: _F) -> _F:
-    """``--ustep``, ``--sprf``, ``--slow``: the parameters of that name."""
-    for option in (
-        click.option(
-            "--slow",
-            type=click.IntRange(1, _BYTE),
-            default=10,
-            show_default=True,
-            help="RPM up to which there are no ramps.",
-        ),
-        click.option(
-            "--sprf",
-            type=click.IntRange(1, 65_535),
-            default=200,
-            show_default=True,
-            help="Full steps per revolution.",
-        ),
-        click.option(
-            "--ustep",
-            type=click.IntRange(0, 7),
-            default=0,
-            show_default=True,
-            help="Microsteps, as a power of two.",
-        ),
-    ):
-        command = option(command)
-    return command
+def _all_of(*options: Callable[[_F], _F]) -> Callable[[_F], _F]:
+    """These options, in this order in a command's help."""
+
+    def given_to(command: _F) -> _F:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return given_to
 
 
-def tuning_options(command: _F) -> _F:
-    """``--ihd``, ``--xclk``: what a node's time is tuned by."""
-    for option in (
-        click.option(
-            "--xclk",
-            type=click.IntRange(0, _BYTE),
-            default=0,
-            show_default=True,
-            help="Half microseconds added to every period.",
-        ),
-        click.option(
-            "--ihd",
-            type=click.IntRange(0, _BYTE),
-            default=8,
-            show_default=True,
-            help="Half microseconds taken from every period; 8 is exact.",
-        ),
-    ):
-        command = option(command)
-    return command
+#: ``--ustep``, ``--sprf``, ``--slow``: the parameters of that name.
+drive_options: Final = _all_of(
+    click.option(
+        "--ustep",
+        type=click.IntRange(0, 7),
+        default=0,
+        show_default=True,
+        help="Microsteps, as a power of two.",
+    ),
+    click.option(
+        "--sprf",
+        type=click.IntRange(1, 65_535),
+        default=200,
+        show_default=True,
+        help="Full steps per revolution.",
+    ),
+    click.option(
+        "--slow",
+        type=click.IntRange(1, _BYTE),
+        default=10,
+        show_default=True,
+        help="RPM up to which there are no ramps.",
+    ),
+)
+
+#: ``--ihd``, ``--xclk``: what a node's time is tuned by.
+tuning_options: Final = _all_of(
+    click.option(
+        "--ihd",
+        type=click.IntRange(0, _BYTE),
+        default=8,
+        show_default=True,
+        help="Half microseconds taken from every period; 8 is exact.",
+    ),
+    click.option(
+        "--xclk",
+        type=click.IntRange(0, _BYTE),
+        default=0,
+        show_default=True,
+        help="Half microseconds added to every period.",
+    ),
+)
 
 
 def tuned_drive(given: Mapping[str, Any]) -> Drive:
