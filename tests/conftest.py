@@ -27,14 +27,20 @@ _DESCRIPTORS = Path("/proc/self/fd")
 
 
 def open_descriptors() -> dict[str, str]:
-    """Descriptor to what it is open on; empty where the system does not tell."""
+    """Descriptor to what it is open on; empty where the system does not tell.
+
+    Without fonts: matplotlib keeps each open for the life of the process from the first picture
+    on that wants it, whichever test happens to draw that.
+    """
     found = {}
     if _DESCRIPTORS.is_dir():
         for entry in _DESCRIPTORS.iterdir():
             try:
-                found[entry.name] = str(entry.readlink())
+                target = entry.readlink()
             except FileNotFoundError:  # the directory's own descriptor, closed by now
                 continue
+            if target.suffix != ".ttf":
+                found[entry.name] = str(target)
     return found
 
 

@@ -16,7 +16,6 @@ import pytest
 
 from sacbus.cli import run
 from sacbus.trace import read
-from tests.drawing import load_fonts
 from tests.machining.seen import check_that_it_ran_as_listed, listed
 
 Captured = pytest.CaptureFixture[str]
@@ -33,11 +32,6 @@ G1 X0 Y0
 M0
 M30
 """
-
-
-@pytest.fixture(scope="module")
-def _fonts() -> None:
-    load_fonts()
 
 
 @pytest.fixture
@@ -107,7 +101,6 @@ def test_the_commands_are_written_so_that_anyone_can_read_them(
     assert capsys.readouterr().out == text
 
 
-@pytest.mark.usefixtures("_fonts")
 @pytest.mark.parametrize(("name", "begins"), [("part.png", b"\x89PNG"), ("part.svg", b"<?xml")])
 def test_the_path_is_drawn(name: str, begins: bytes, program: Path, tmp_path: Path) -> None:
     picture = tmp_path / name

@@ -20,18 +20,13 @@ from sacbus.mother import safe_body
 from sacbus.trace import read
 from sacbus.trace.records import Moved, Sent
 from sacbus.wire import encode
-from tests.drawing import load_fonts, without_matplotlib
+from tests.drawing import without_matplotlib
 from tests.serving import client, served, until
 from tests.trace.rig import Dump, recorded, two_axes
 
 Captured = pytest.CaptureFixture[str]
 
 ACK_10 = bytes.fromhex("02 01 0a 06")
-
-
-@pytest.fixture(scope="module")
-def _fonts() -> None:
-    load_fonts()
 
 
 @pytest.fixture
@@ -235,7 +230,6 @@ def test_what_is_wrong_is_one_line_and_status_2(
     assert text.format(**names) in line
 
 
-@pytest.mark.usefixtures("_fonts")
 @pytest.mark.slow
 @pytest.mark.parametrize("ending", ["png", "svg"])
 def test_a_recording_is_drawn(

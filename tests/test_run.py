@@ -18,7 +18,7 @@ import pytest
 
 from sacbus.cli import run
 from sacbus.trace import read
-from tests.drawing import load_fonts, without_matplotlib
+from tests.drawing import without_matplotlib
 from tests.serving import PATIENCE, served, started
 
 Captured = pytest.CaptureFixture[str]
@@ -35,11 +35,6 @@ send = "10m{steps}v300"
 [[step]]
 expect = { node = 10, position = 40, state = "STANDBY", within = "2 s" }
 """
-
-
-@pytest.fixture(scope="module")
-def _fonts() -> None:
-    load_fonts()
 
 
 @pytest.fixture
@@ -276,7 +271,6 @@ def test_what_cannot_be_written_to_its_end_leaves_what_was_there(
     assert sorted(tmp_path.iterdir()) == sorted([file, vcd, pcap])
 
 
-@pytest.mark.usefixtures("_fonts")
 @pytest.mark.slow
 def test_a_picture_is_drawn(file: Path, tmp_path: Path) -> None:
     path = tmp_path / "a.svg"
@@ -293,7 +287,6 @@ def test_a_picture_that_is_not_drawn_is_told_before_anything_is_played(
     assert err.startswith("error: pictures are drawn as PNG or SVG, a.pdf, ")
 
 
-@pytest.mark.usefixtures("_fonts")
 @pytest.mark.slow
 def test_a_page_has_all_cases_with_pictures_and_how_to_repeat_each(
     file: Path, tmp_path: Path

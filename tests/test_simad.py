@@ -17,7 +17,7 @@ from sacbus.cli.recordings import span
 from sacbus.cli.simad_encode import RULES, _verdict
 from sacbus.simad import GECKO
 from sacbus.trace import read
-from tests.drawing import load_fonts, without_matplotlib
+from tests.drawing import without_matplotlib
 from tests.simad.reference import broken_rules, driven
 from tests.trace.rig import Dump, recorded, two_axes
 
@@ -72,11 +72,6 @@ send = "10m-50v60"
 bus = "left"
 expect = { node = 10, position = 150, within = "5 s" }
 """
-
-
-@pytest.fixture(scope="module")
-def _fonts() -> None:
-    load_fonts()
 
 
 @pytest.fixture
@@ -317,7 +312,6 @@ def test_mistakes_are_one_line_and_status_2(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_fonts")
 def test_a_few_steps_are_drawn(steps: Path, tmp_path: Path, capsys: Captured) -> None:
     picture = tmp_path / "steps.svg"
     assert run(["simad", "encode", str(steps), "--plot", str(picture)]) == 0
@@ -338,7 +332,6 @@ def test_drawing_needs_matplotlib(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_fonts")
 def test_the_page_about_it_shows_what_it_prints_and_draws(tmp_path: Path, capsys: Captured) -> None:
     page = (ROOT / "docs" / "simad.md").read_text(encoding="utf-8")
     command, _, printed = (

@@ -8,16 +8,11 @@ from pathlib import Path
 import pytest
 
 from examples import pictures
-from tests.drawing import load_fonts, without_matplotlib
+from tests.drawing import without_matplotlib
 
 pytestmark = pytest.mark.slow
 
 DOCS = Path(__file__).parents[2] / "docs"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _fonts() -> None:
-    load_fonts()
 
 
 def words(picture: Path) -> str:

@@ -12,18 +12,13 @@ import numpy as np
 import pytest
 
 from sacbus.cli import run
-from tests.drawing import load_fonts, without_matplotlib
+from tests.drawing import without_matplotlib
 
 Captured = pytest.CaptureFixture[str]
 
 DATA = Path(__file__).parents[1] / "data"
 QUEUE = DATA / "companion-queue.txt"
 ONE_SHOTS = DATA / "companion-one-shot.txt"
-
-
-@pytest.fixture(scope="module")
-def _fonts() -> None:
-    load_fonts()
 
 
 @pytest.fixture
@@ -165,7 +160,6 @@ def test_pulses_to_standard_output_stand_alone(capfdbinary: pytest.CaptureFixtur
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_fonts")
 def test_a_picture_is_written_beside_the_report(capsys: Captured, directory: Path) -> None:
     assert "total" in told(capsys, "--queue", QUEUE, "--plot", "queue.svg")
     assert b"30 commands" in (directory / "queue.svg").read_bytes()

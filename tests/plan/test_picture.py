@@ -13,16 +13,10 @@ from sacbus.language import Defaults
 from sacbus.motion import Drive
 from sacbus.plan import Commands, Plan, PlanError, QueueFile, Spool
 from sacbus.plan.picture import MOST_COMMANDS, SHADES, draw_plan
-from tests.drawing import load_fonts
 
 pytestmark = pytest.mark.slow
 
 DATA = Path(__file__).parents[1] / "data"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _fonts() -> None:
-    load_fonts()
 
 
 def drawn(*lines: str, form: str = "svg", loops: int = 1, drive: Drive | None = None) -> bytes:

@@ -10,14 +10,8 @@ import pytest
 from sacbus.simad import Steps, encode
 from sacbus.simad.excerpt import excerpt
 from sacbus.simad.picture import draw_lines
-from tests.drawing import load_fonts
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _fonts() -> None:
-    load_fonts()
 
 
 def drawn(form: str = "svg") -> bytes:

@@ -17,15 +17,9 @@ from sacbus.mother import Mother, MotherError, NoAnswer
 from sacbus.picture_format import PictureError
 from sacbus.trace import Recorder, Recording
 from sacbus.trace.plots import HIT, MOST_TALKERS, draw_axes, draw_path
-from tests.drawing import load_fonts
 from tests.trace.rig import recorded, two_axes
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _fonts() -> None:
-    load_fonts()
 
 
 @pytest.fixture(scope="module")
