@@ -44,7 +44,8 @@ async def serve(
 ) -> int:
     """Host buses until SIGINT (status 130), SIGTERM (0) or a closed terminal (129).
 
-    ``record``: where to record all that happens, a file that is written anew.
+    ``record``: where to record all that happens, a file that is written anew. When that cannot be
+    written on, the buses go on, a report says so, and RecordingCutOff is raised at the end.
 
     Raises what :func:`~sacbus.daemon.open_bus` does, and OSError when standard output cannot be
     written any more (BrokenPipeError: its reader has left); the buses are closed in order then too.
@@ -65,7 +66,7 @@ async def serve(
         buses = [await stack.enter_async_context(open_bus(one)) for one in configurations]
         recorder = None
         if record is not None:
-            sink = stack.enter_context(record.open("wb"))
+            sink = stack.enter_context(record.open("wb", buffering=0))
             recorder = stack.enter_context(Recorder(buses, sink))
         for bus in buses:
             feed = FeedServer(bus)
@@ -97,6 +98,8 @@ async def serve(
         status = ended.result()
     output.stopped()
     output.close()
+    if recorder is not None and recorder.fault is not None:
+        raise recorder.fault
     return status
 
 

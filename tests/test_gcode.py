@@ -16,6 +16,7 @@ import pytest
 
 from sacbus.cli import run
 from sacbus.trace import read
+from tests.full_disk import needs_full_device
 from tests.machining.seen import check_that_it_ran_as_listed, listed
 
 Captured = pytest.CaptureFixture[str]
@@ -99,6 +100,19 @@ def test_the_commands_are_written_so_that_anyone_can_read_them(
     capsys.readouterr()
     assert run(["gcode", str(program), *AXES, "--plan-only", "-o", "-"]) == 0
     assert capsys.readouterr().out == text
+
+
+@needs_full_device
+def test_a_recording_that_cannot_be_written_is_told_of_behind_the_account(
+    program: Path, capsys: Captured
+) -> None:
+    assert run(["gcode", str(program), *AXES, "--record", "/dev/full"]) == 1
+    out, err = capsys.readouterr()
+    assert "X          asked for" in out
+    assert err.endswith(
+        "M30\nerror: the recording /dev/full could not be begun: No space left on device, "
+        "nothing is kept, record elsewhere\n"
+    )
 
 
 @pytest.mark.parametrize(("name", "begins"), [("part.png", b"\x89PNG"), ("part.svg", b"<?xml")])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import resource
 import signal
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
@@ -21,6 +22,7 @@ from sacbus.trace import read
 from sacbus.trace.records import Moved, Sent
 from sacbus.wire import encode
 from tests.drawing import without_matplotlib
+from tests.full_disk import needs_full_device, needs_full_disk
 from tests.serving import client, served, until
 from tests.trace.rig import Dump, recorded, two_axes
 
@@ -78,6 +80,49 @@ def test_killed_while_it_records_much_it_leaves_a_file_that_can_be_read(tmp_path
     records = list(recording)
     assert len([one for one in records if isinstance(one, Moved)]) > 50
     assert not recording.whole
+
+
+@pytest.mark.slow
+@needs_full_disk
+def test_serve_tells_at_once_of_a_disk_that_is_full_goes_on_and_ends_with_status_1(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "run.jsonl"
+    with served("--ephemeral", "--record", str(path)) as sacbus, client(sacbus.link) as port:
+        until(lambda: path.stat().st_size)
+        room = path.stat().st_size + 300
+        resource.prlimit(sacbus.process.pid, resource.RLIMIT_FSIZE, (room, room))
+        for _ in range(3):
+            port.write(encode(10, 1, b""))
+            assert port.read(4) == ACK_10
+        told = sacbus.read_event("report")
+        port.write(encode(10, 1, b"S"))  # the bus goes on
+        assert port.read(4) == ACK_10
+        assert sacbus.send_signal(signal.SIGTERM) == 1
+        assert sacbus.read_event("stopped")
+        errors = sacbus.errors()
+    assert re.fullmatch(
+        rf"the recording {path} ends at \d+\.\d{{6}} s: File too large, "
+        "what came before is kept, record elsewhere",
+        told["text"],
+    )
+    assert errors == f"error: {told['text']}\n"
+    recording = read(path)
+    assert list(recording)
+    assert not recording.whole
+
+
+@pytest.mark.slow
+@needs_full_device
+def test_serve_says_when_a_recording_could_not_be_begun() -> None:
+    with served("--ephemeral", "--record", "/dev/full") as sacbus:
+        told = sacbus.read_event("report")
+        assert sacbus.send_signal(signal.SIGINT) == 1
+        assert sacbus.errors() == f"error: {told['text']}\n"
+    assert told["text"] == (
+        "the recording /dev/full could not be begun: No space left on device, nothing is kept, "
+        "record elsewhere"
+    )
 
 
 def test_export_writes_what_it_is_asked_for(

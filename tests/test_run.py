@@ -12,6 +12,7 @@ import sys
 from html import unescape
 from itertools import pairwise
 from pathlib import Path
+from tempfile import gettempdir
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -19,6 +20,7 @@ import pytest
 from sacbus.cli import run
 from sacbus.trace import read
 from tests.drawing import without_matplotlib
+from tests.full_disk import needs_full_device, needs_full_disk
 from tests.serving import PATIENCE, served, started
 
 Captured = pytest.CaptureFixture[str]
@@ -269,6 +271,85 @@ def test_what_cannot_be_written_to_its_end_leaves_what_was_there(
             assert run(["run", str(file), option, str(place)]) == 1
     assert [vcd.read_text(), pcap.read_text()] == ["before", "before"]
     assert sorted(tmp_path.iterdir()) == sorted([file, vcd, pcap])
+
+
+FULL = (
+    "error: the recording /dev/full could not be begun: No space left on device, nothing is kept, "
+    "record elsewhere\n"
+)
+
+
+@needs_full_device
+def test_a_recording_that_cannot_be_written_ends_it_with_status_1(
+    file: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    assert run(["run", str(file), "--record", "/dev/full"]) == 1
+    assert capsys.readouterr() == ("", FULL)
+    results = tmp_path / "results.xml"
+    assert run(["run", str(file), "--record", "/dev/full", "--junit", str(results)]) == 1
+    assert not results.exists()
+
+
+@pytest.mark.slow
+@needs_full_device
+def test_a_recording_in_real_time_that_cannot_be_written_ends_it_at_once(file: Path) -> None:
+    file.write_text(
+        '[[bus]]\n[[bus.nodes]]\naddress = 10\n[[step]]\nsend = "10"\nevery = "1 ms"\n'
+        'for = "1000 h"\n'
+    )
+    command = [sys.executable, "-m", "sacbus", "run", str(file), "--real", "--record", "/dev/full"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (1, "", FULL)
+
+
+@pytest.mark.slow
+@needs_full_disk
+def test_a_disk_that_gets_full_ends_it_at_once_and_keeps_what_came_before(file: Path) -> None:
+    file.write_text(
+        '[[bus]]\n[[bus.nodes]]\naddress = 10\n[[step]]\nsend = "10"\nevery = "1 ms"\n'
+        'for = "1000 h"\n'
+    )
+    recording = file.with_suffix(".jsonl")
+    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000)); "
+    code += "from sacbus.cli import run; sys.exit(run(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "run", str(file), "--record", str(recording)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    found = re.fullmatch(
+        rf"error: the recording {recording} ends at (\d+\.\d{{6}}) s: File too large, "
+        r"what came before is kept, record elsewhere\n",
+        ended.stderr,
+    )
+    assert found is not None
+    kept = read(recording)
+    assert list(kept)
+    assert abs(kept.end / 1e9 - float(found[1])) < 2
+    assert not kept.whole
+
+
+@pytest.mark.slow
+@needs_full_disk
+def test_pictures_that_the_disk_has_no_room_for_are_told_of_and_what_had_ended_is_kept(
+    file: Path, tmp_path: Path
+) -> None:
+    bus = "[[bus]]\n[[bus.nodes]]\naddress = 10\n[[step]]\n"
+    file.write_text(bus + 'send = "10m40"\n')
+    long = tmp_path / "long.toml"
+    long.write_text(bus + 'send = "10"\nevery = "1 ms"\nfor = "1000 h"\n')
+    results, page = tmp_path / "results.xml", tmp_path / "page.html"
+    code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (2**20, 2**20)); "
+    code += "from sacbus.cli import run; sys.exit(run(sys.argv[1:]))"
+    arguments = ["run", str(file), str(long), "--junit", str(results), "--report", str(page)]
+    command = [sys.executable, "-c", code, *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert ended.returncode == 1
+    assert ended.stdout.startswith(f"passed {file}")
+    assert ended.stderr == (
+        f"error: {gettempdir()}: File too large, what pictures are made of is kept there as long "
+        "as it is played, make room or set TMPDIR\n"
+    )
+    assert 'tests="1"' in results.read_text("utf-8")
+    assert str(file) in page.read_text("utf-8")
 
 
 @pytest.mark.slow

@@ -192,7 +192,9 @@ def gcode_command(
                     os.close(_terminal())  # before anything moves
                 machined = run_on_link(course, progress.told(_ask), link, baud=baud)
             else:
-                sink = None if record is None else stack.enter_context(Path(record).open("wb"))
+                sink = None
+                if record is not None:
+                    sink = stack.enter_context(Path(record).open("wb", buffering=0))
                 machined = rehearse(
                     course,
                     progress.told(_go_on),
@@ -210,6 +212,8 @@ def gcode_command(
     elif output != STANDARD:
         for line in account(program.name, checked, course, machined):
             click.echo(line)
+    if machined.cut_off is not None:
+        raise machined.cut_off
     return 0 if _arrived(course, machined) else 1
 
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryFile, gettempdir
 from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
 
 import click
@@ -167,7 +167,7 @@ def run_command(
                 _tell(result)
             if first and not result.passed:
                 break
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, OSError):  # a line that is lost, a disk that is full
         # What had ended is kept; the one that had not is in none of them.
         if results:
             write()
@@ -230,8 +230,20 @@ def _opened(path: str | None, needed: bool) -> Iterator[BinaryIO | None]:
     if path is None and not needed:
         yield None
         return
-    with TemporaryFile("w+b") if path is None else Path(path).open("w+b") as file:
-        yield file
+    if path is not None:
+        with Path(path).open("w+b", buffering=0) as file:
+            yield file
+        return
+    from sacbus.trace import RecordingCutOff
+
+    with TemporaryFile("w+b", buffering=0) as file:
+        try:
+            yield file
+        except RecordingCutOff as fault:
+            what = (
+                f"{fault.reason}, what pictures are made of is kept there as long as it is played"
+            )
+            raise OSError(f"{gettempdir()}: {what}, make room or set TMPDIR") from fault
 
 
 def _export(recording: Recording, vcd: str | None, pcap: str | None) -> None:

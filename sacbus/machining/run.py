@@ -24,7 +24,7 @@ from sacbus.mother import Mother, Stream, Streamed
 from sacbus.mother.pace import command_seconds, measured_command_seconds
 from sacbus.node import Report
 from sacbus.toolpath import Axis, Machine
-from sacbus.trace import Recorder
+from sacbus.trace import Recorder, RecordingCutOff
 
 __all__ = ["Machined", "Told", "plan_only", "rehearse", "run_on_link"]
 
@@ -54,7 +54,8 @@ class Machined:
 
     streamed: None when it was only planned. reached: full steps, clockwise up, by the axes' places,
     as the nodes have it; None where they cannot be asked. done: the path they went, mm by axis.
-    reports: what nodes had to say, and how often.
+    reports: what nodes had to say, and how often. cut_off: why the recording that was asked for is
+    not whole.
     """
 
     command_seconds: float
@@ -62,6 +63,7 @@ class Machined:
     reached: tuple[float, ...] | None = None
     done: Trail[Point] | None = None
     reports: Mapping[str, int] = field(default_factory=dict)
+    cut_off: RecordingCutOff | None = None
 
 
 def plan_only(course: Course, *, baud: int, progress: Callable[[int], object]) -> Machined:
@@ -96,9 +98,10 @@ async def _rehearsed(
     configuration = Configuration(nodes=tuple(map(_node, machine.axes)), baud=baud)
     async with open_bus(configuration) as bus:
         with ExitStack() as stack:
-            if record is not None:
-                stack.enter_context(Recorder(bus, record))
+            recorder = None if record is None else stack.enter_context(Recorder(bus, record))
             await _on_bus(bus, course, told, machined, watch=watch)
+        if recorder is not None:
+            machined.cut_off = recorder.fault
     return machined
 
 

@@ -28,6 +28,7 @@ from sacbus.scenario.result import Result
 from sacbus.scenario.rules import refuse
 from sacbus.scenario.tape import Tape
 from sacbus.scenario.values import Scenario
+from sacbus.trace import RecordingCutOff
 
 __all__ = ["run", "run_on_link", "run_real"]
 
@@ -45,6 +46,7 @@ def run(
 
     ``record``: an empty file, open for reading and writing, that the recording goes to; it must
     stay open for as long as that is read. Without one, what expectations need is kept in memory.
+    RecordingCutOff, at once, when it cannot be written on: the play is not gone on with.
     ``progress`` is called every :data:`SLICE` of bus time.
     """
     refuse(scenario)
@@ -59,7 +61,7 @@ async def _virtually(
         hosted = await _host(stack, [_alone(bus) for bus in scenario.buses])
         benches = {one.configuration.name: hosted_bench(one) for one in hosted}
         play = Play(scenario, benches)
-        stack.enter_context(_recorded(play, hosted, benches, record))
+        stack.enter_context(_recorded(play, hosted, benches, record, _cut_off))
         play.when_over = _end
         with suppress(_Over):
             play.begin()
@@ -79,6 +81,11 @@ class _Over(Exception):
 
 def _end() -> None:
     raise _Over
+
+
+def _cut_off(fault: RecordingCutOff) -> None:
+    """Leaves the kernel where the recording could not be written on."""
+    raise fault
 
 
 def run_real(
@@ -108,8 +115,13 @@ async def _really(
             bench.look = round(bench.look * max(speed, 1.0))
             benches[bus.configuration.name] = bench
         play = Play(scenario, benches)
-        stack.enter_context(_recorded(play, hosted, benches, record))
         over = _over(play)
+
+        def cut_off(fault: RecordingCutOff) -> None:
+            if not over.done():
+                over.set_exception(fault)
+
+        stack.enter_context(_recorded(play, hosted, benches, record, cut_off))
         first = hosted[0]
         first.host.arrive(play.begin)
         await _until(over, progress, first.now)
@@ -146,6 +158,7 @@ def _recorded(
     hosted: Sequence[HostedBus],
     benches: Mapping[str, Bench],
     record: BinaryIO | None,
+    cut_off: Callable[[RecordingCutOff], object],
 ) -> Iterator[None]:
     """Record for as long as it is played, if anybody asks for it."""
     if record is None:
@@ -154,7 +167,7 @@ def _recorded(
             yield
             return
         record = BytesIO()
-    tape = Tape(hosted, record)
+    tape = Tape(hosted, record, cut_off)
     for bench in benches.values():
         bench.tape = tape
     try:

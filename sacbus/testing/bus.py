@@ -262,8 +262,11 @@ class VirtualBus:
     # ---- inside ----
 
     def close(self) -> None:
-        """End the recording; the bus is its host's to close."""
-        self._tape.recorder.close()
+        """End the recording; the bus is its host's to close. RecordingCutOff if it is not whole."""
+        recorder = self._tape.recorder
+        recorder.close()
+        if recorder.fault is not None:
+            raise recorder.fault
 
     def _wanted(self, expected: Expectation | None, keys: Mapping[str, object]) -> Expectation:
         return wanted(expected, keys, self.hosted.configuration)

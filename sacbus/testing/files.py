@@ -5,7 +5,6 @@ Owns how they are collected, played, and told of when they fail.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,8 @@ import pytest
 from sacbus.config.mistake import ConfigError
 from sacbus.scenario import Result, Scenario, read, run
 from sacbus.scenario.result import case_words
+from sacbus.testing.recordings import Recordings
+from sacbus.trace import RecordingCutOff
 
 __all__ = ["ScenarioFile", "ScenarioItem"]
 
@@ -47,9 +48,9 @@ class ScenarioItem(pytest.Item):
         if directory is None:
             result = run(self.scenario)
         else:
-            Path(directory).mkdir(parents=True, exist_ok=True)
-            name = re.sub(r"[^A-Za-z0-9_.-]+", "-", self.nodeid)
-            with (Path(directory) / f"{name}.jsonl").open("w+b") as record:
+            root = self.config.rootpath
+            recordings = Recordings(Path(directory), self.nodeid, self.path, root)
+            with recordings.open() as record:
                 result = run(self.scenario, record=record)
         if not result.passed:
             raise _Failed(result)
@@ -60,7 +61,7 @@ class ScenarioItem(pytest.Item):
         style: Any = None,  # noqa: ANN401
     ) -> Any:  # noqa: ANN401 (as pytest has it)
         """The expectations that failed, with the last packets and the states; no traceback."""
-        if isinstance(excinfo.value, _Failed):
+        if isinstance(excinfo.value, _Failed | RecordingCutOff):
             return str(excinfo.value)
         return super().repr_failure(excinfo, style)
 

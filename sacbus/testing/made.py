@@ -1,13 +1,12 @@
 """The making of buses for tests: from the words of a marker to a bus in virtual time.
 
-Owns those words, the order of opening and closing, and where recordings go.
+Owns those words, and the order of opening and closing.
 """
 
 from __future__ import annotations
 
 import asyncio
 import dataclasses
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, ExitStack, contextmanager
 from functools import partial
@@ -24,6 +23,7 @@ from sacbus.hosted import HostedBus
 from sacbus.kernel import Kernel
 from sacbus.node import SettingError, find_kind, setting_list
 from sacbus.testing.bus import VirtualBus
+from sacbus.testing.recordings import Recordings
 
 __all__ = ["BusMaker", "configured", "virtual_bus"]
 
@@ -37,9 +37,6 @@ _OF_BUS: Final[Mapping[str, type]] = {
     "seed": int,
 }
 
-#: What stands in the names of recordings as it is.
-_PLAIN: Final = re.compile(r"[^A-Za-z0-9_.-]+")
-
 
 class BusMaker:
     """Makes the buses of one test, all on one clock, and closes them with it.
@@ -51,7 +48,7 @@ class BusMaker:
             right = make_bus("workshop.toml", name="right")
 
     ``directory`` is where the paths of configurations begin, ``recordings`` where each bus is
-    recorded to, under the test's ``name``.
+    recorded to.
     """
 
     def __init__(
@@ -59,14 +56,12 @@ class BusMaker:
         kernel: Kernel,
         *,
         directory: Path | None = None,
-        recordings: Path | None = None,
-        name: str = "",
+        recordings: Recordings | None = None,
     ) -> None:
         self.buses: list[VirtualBus] = []
         self._kernel = kernel
         self._directory = directory or Path.cwd()
         self._recordings = recordings
-        self._name = name
         self._stack = ExitStack()
 
     def __call__(self, file: str | Path | None = None, /, **words: object) -> VirtualBus:
@@ -92,16 +87,13 @@ class BusMaker:
         return bus
 
     def close(self) -> None:
-        """Close all of them; what was seen of them stays."""
+        """Close all of them; what was seen of them stays. RecordingCutOff as they have it."""
         self._stack.close()
 
     def _tape(self, bus: str) -> BinaryIO:
         if self._recordings is None:
             return BytesIO()
-        self._recordings.mkdir(parents=True, exist_ok=True)
-        number = "" if not self.buses else f"-{len(self.buses) + 1}"
-        name = _PLAIN.sub("-", f"{self._name}-{bus}{number}").strip("-")
-        return (self._recordings / f"{name}.jsonl").open("w+b")
+        return self._recordings.open(bus, *([str(len(self.buses) + 1)] if self.buses else []))
 
 
 @contextmanager

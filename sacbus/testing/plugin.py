@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from sacbus.mother import Mother
     from sacbus.testing.bus import VirtualBus
     from sacbus.testing.made import BusMaker
+    from sacbus.testing.recordings import Recordings
 
 __all__: list[str] = []
 
@@ -188,15 +189,30 @@ def make_bus(request: pytest.FixtureRequest, _sacbus_clock: Kernel) -> Iterator[
     """Makes buses in virtual time, all of this test on one clock; it takes the marker's words."""
     from sacbus.testing.made import BusMaker  # noqa: PLC0415 (wanted now)
 
-    recordings = request.config.getoption("--sacbus-record")
     maker = request.node.stash[_maker_of] = BusMaker(
-        _sacbus_clock,
-        directory=request.path.parent,
-        recordings=None if recordings is None else Path(recordings),
-        name=request.node.nodeid,
+        _sacbus_clock, directory=request.path.parent, recordings=_recordings(request)
     )
     yield maker
-    maker.close()
+    from sacbus.trace import RecordingCutOff  # noqa: PLC0415 (wanted now)
+
+    try:
+        maker.close()
+    except RecordingCutOff as fault:
+        cut_off = str(fault)
+    else:
+        return
+    pytest.fail(f"sacbus: {cut_off}", pytrace=False)
+
+
+def _recordings(request: pytest.FixtureRequest) -> Recordings | None:
+    """Where this test's buses are recorded to, if anybody wants that."""
+    directory = request.config.getoption("--sacbus-record")
+    if directory is None:
+        return None
+    from sacbus.testing.recordings import Recordings  # noqa: PLC0415 (wanted now)
+
+    root = request.config.rootpath
+    return Recordings(Path(directory), request.node.nodeid, request.path, root)
 
 
 @pytest.fixture

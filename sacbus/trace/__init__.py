@@ -16,13 +16,14 @@ if TYPE_CHECKING:
     from sacbus.trace.exchange import write_pcapng
     from sacbus.trace.paths import RESTS, last_path
     from sacbus.trace.reading import Recording, RecordingError, read
-    from sacbus.trace.recorder import Recorder
+    from sacbus.trace.recorder import Recorder, RecordingCutOff
     from sacbus.trace.track import Track
 
 __all__ = [
     "RESTS",
     "Recorder",
     "Recording",
+    "RecordingCutOff",
     "RecordingError",
     "Track",
     "last_path",
@@ -34,6 +35,7 @@ _HOMES: Final = {
     "RESTS": "paths",
     "Recorder": "recorder",
     "Recording": "reading",
+    "RecordingCutOff": "recorder",
     "RecordingError": "reading",
     "Track": "track",
     "last_path": "paths",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
+from io import BufferedReader, RawIOBase
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -149,9 +150,17 @@ class Recording:
         if isinstance(self._source, Path):
             with self._source.open("rb") as file:
                 yield from _whole_lines(file)
-        else:
-            self._source.seek(0)
+            return
+        self._source.seek(0)
+        if not isinstance(self._source, RawIOBase):
             yield from _whole_lines(self._source)
+            return
+        # By itself it would read a line byte by byte.
+        buffer = BufferedReader(self._source)
+        try:
+            yield from _whole_lines(buffer)
+        finally:
+            buffer.detach()  # the file is not this one's to close
 
     def _wrong(self, number: int, expected: str, line: bytes) -> RecordingError:
         shown = line[:40].decode("utf-8", "backslashreplace").strip()

@@ -26,7 +26,7 @@ from sacbus.node import Node, Report
 from sacbus.panel import Deed, Drive, Power, Turn
 from sacbus.trace.records import FORMAT
 
-__all__ = ["Recorder"]
+__all__ = ["Recorder", "RecordingCutOff"]
 
 _W = TypeVar("_W")
 
@@ -43,6 +43,26 @@ TAIL: Final = 256
 SHAPES: Final = 65_536
 
 
+class RecordingCutOff(OSError):
+    """A recording that cannot be written on; its text is a line for users.
+
+    ``name``: the file, empty when it has none. ``kept``: up to which bus time all is in it, ns;
+    None: nothing is. ``reason``: the system's word for it.
+    """
+
+    def __init__(self, name: str, kept: Ns | None, reason: str) -> None:
+        self.name = name
+        self.kept = kept
+        self.reason = reason
+        what = f"the recording{f' {name}' if name else ''}"
+        if kept is None:
+            text = f"{what} could not be begun: {reason}, nothing is kept, record elsewhere"
+        else:
+            until = f"{kept / SECOND:.6f} s"
+            text = f"{what} ends at {until}: {reason}, what came before is kept, record elsewhere"
+        super().__init__(text)
+
+
 class Recorder:
     """Records some buses into ``sink`` from now on, until it is closed; the sink is the caller's.
 
@@ -51,13 +71,26 @@ class Recorder:
         with path.open("wb") as sink, Recorder(bus, sink) as recorder:
             ...
 
-    A sink that cannot be written to ends the recording, not the bus: it is reported there, and
-    :attr:`fault` says so.
+    A sink that cannot be written to ends the recording, not the bus: it is reported there,
+    :attr:`fault` says so, and ``cut_off`` is called with that at once, in the middle of whatever
+    was recorded; raising is up to it. Such a sink is best one without a buffer
+    (``path.open("wb", buffering=0)``): a buffer tries to write what is in it once more when it is
+    closed, and raises again.
     """
 
-    def __init__(self, buses: HostedBus | Sequence[HostedBus], sink: BinaryIO) -> None:
+    def __init__(
+        self,
+        buses: HostedBus | Sequence[HostedBus],
+        sink: BinaryIO,
+        *,
+        cut_off: Callable[[RecordingCutOff], object] | None = None,
+    ) -> None:
         several = [buses] if isinstance(buses, HostedBus) else list(buses)
+        self._first = several[0]
         self._sink = sink
+        self._cut_off = cut_off
+        #: Up to when all is in the sink; None: nothing has been written.
+        self._kept: Ns | None = None
         self._lines: list[str] = []
         self._tail: deque[str] = deque(maxlen=TAIL)
         self._written: Ns = 0
@@ -66,7 +99,8 @@ class Recorder:
         self._numbers = count()
         self._closed = False
         #: Why nothing can be written any more; None: it can.
-        self.fault: OSError | None = None
+        self.fault: RecordingCutOff | None = None
+        self._places: list[_Place] = []
         self._head = _text(
             {
                 "sacbus": "recording",
@@ -75,7 +109,15 @@ class Recorder:
             }
         )
         self._lines.append(self._head)
-        self._places = [_Place(self, number, bus) for number, bus in enumerate(several)]
+        self._begin(several)
+
+    def _begin(self, buses: Sequence[HostedBus]) -> None:
+        for number, bus in enumerate(buses):
+            self._places.append(_Place(self, number, bus))
+            # What it tells at its beginning may be enough to be written.
+            if self.fault is not None:
+                self._let_go()
+                return
 
     # ---- what whoever records adds ----
 
@@ -119,12 +161,24 @@ class Recorder:
         data = "\n".join(self._lines).encode()
         self._lines.clear()
         try:
-            self._sink.write(data)
+            while data:  # a sink without a buffer may take a part of it
+                data = data[self._sink.write(data) :]
             self._sink.flush()
         except OSError as fault:
-            self.fault = fault
-            self._let_go()
-            self._places[0].hosted.tell(f"the recording ends here: {fault.strerror or fault}")
+            self._end(fault)
+        else:
+            self._kept = self._first.bus.kernel.now
+
+    def _end(self, fault: OSError) -> None:
+        """Nothing can be written any more: who records and who looks on are told."""
+        name = getattr(self._sink, "name", "")
+        named = name if isinstance(name, str) else ""  # one without a name has a number
+        self.fault = RecordingCutOff(named, self._kept, fault.strerror or str(fault))
+        self.fault.__cause__ = fault
+        self._let_go()
+        self._first.tell(str(self.fault))
+        if self._cut_off is not None:
+            self._cut_off(self.fault)
 
     def close(self) -> None:
         """End the recording; what is written says that it is whole. Harmless when repeated."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -10,6 +11,7 @@ import pytest
 import nodes.sac  # noqa: F401
 import sacbus.testing.files
 import sacbus.testing.made  # noqa: F401
+from tests.full_disk import needs_full_device
 
 pytest_plugins = ["pytester"]
 pytestmark = pytest.mark.slow
@@ -98,7 +100,23 @@ def test_a_scenario_is_recorded_where_asked(pytester: pytest.Pytester) -> None:
     _file(pytester, "move.scenario.toml")
     pytester.runpytest("--sacbus-record=seen").assert_outcomes(passed=1)
     (file,) = (pytester.path / "seen").iterdir()
-    assert file.name == "move.scenario.toml-a-move.jsonl"
+    assert re.fullmatch(r"move\.scenario\.toml-a-move-[0-9a-f]{8}\.jsonl", file.name)
     lines = [json.loads(line) for line in file.read_text().splitlines()]
     assert lines[0]["sacbus"] == "recording"
     assert lines[-1]["is"] == "end"
+
+
+@needs_full_device
+def test_a_scenario_that_could_not_be_recorded_fails_in_one_line(pytester: pytest.Pytester) -> None:
+    _file(pytester, "move.scenario.toml")
+    pytester.runpytest("--sacbus-record=seen").assert_outcomes(passed=1)
+    (file,) = (pytester.path / "seen").iterdir()
+    file.unlink()
+    file.symlink_to("/dev/full")
+    result = pytester.runpytest("--sacbus-record=seen")
+    result.assert_outcomes(failed=1)
+    assert (
+        f"the recording seen/{file.name} could not be begun: No space left on device, "
+        "nothing is kept, record elsewhere"
+    ) in result.outlines
+    assert "Traceback" not in result.stdout.str()

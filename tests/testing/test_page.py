@@ -42,6 +42,24 @@ def test_a_failure_looks_as_the_page_shows_it(pytester: pytest.Pytester) -> None
         assert part in result.stdout.str()
 
 
+@pytest.mark.parametrize("strict", [True, False])
+def test_the_warning_of_pytest_asyncio_is_met_and_goes_as_the_page_says(
+    pytester: pytest.Pytester, *, strict: bool
+) -> None:
+    (settings,) = (text for _, language, text in BLOCKS if language == "toml" and "pytest" in text)
+    path = pytester.path / "pyproject.toml"
+    plain = "[tool.pytest.ini_options]\n" + 'filterwarnings = ["error"]\n' * strict
+    (pytester.path / "test_it.py").write_text("def test_it(): pass\n")
+    path.write_text(plain)
+    met = pytester.runpytest_subprocess("-p", "no:randomly")
+    assert "asyncio_default_fixture_loop_scope" in met.stdout.str() + met.stderr.str()
+    assert ("1 passed" in met.stdout.str()) is not strict
+    path.write_text(settings + plain.partition("\n")[2])
+    gone = pytester.runpytest_subprocess("-p", "no:randomly")
+    gone.assert_outcomes(passed=1)
+    assert "is unset" not in gone.stdout.str() + gone.stderr.str()
+
+
 def test_the_options_in_its_snippet_are_pytest_s(pytester: pytest.Pytester) -> None:
     (command,) = re.findall(r"run: pytest (.+)", PAGE)
     _run(pytester, PASSING[0], *command.split()).assert_outcomes(passed=1)

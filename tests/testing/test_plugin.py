@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 import nodes.sac  # noqa: F401
 import sacbus.testing.files
 import sacbus.testing.made  # noqa: F401
+from tests.full_disk import needs_full_device
 
 pytest_plugins = ["pytester"]
 pytestmark = pytest.mark.slow
@@ -468,15 +470,68 @@ def test_each_bus_is_recorded_where_asked_the_same_in_every_run(
     for directory in "once", "again":
         pytester.runpytest(f"--sacbus-record={directory}").assert_outcomes(passed=1)
         files = sorted((pytester.path / directory).iterdir())
-        assert [file.name.rpartition("test_it-")[2] for file in files] == [
-            "bus-2.jsonl",
-            "bus.jsonl",
+        name = "test_each_bus_is_recorded_where_asked_the_same_in_every_run.py-test_it-bus"
+        assert [re.sub("-[0-9a-f]{8}[.]", "-N.", file.name) for file in files] == [
+            f"{name}-2-N.jsonl",
+            f"{name}-N.jsonl",
         ]
         texts.append([file.read_text() for file in files])
     assert texts[0] == texts[1]
     lines = [json.loads(line) for line in texts[0][0].splitlines()]
     assert lines[0]["sacbus"] == "recording"
     assert lines[-1]["is"] == "end"
+
+
+@needs_full_device
+def test_a_recording_that_is_not_whole_is_an_error_of_the_test_in_one_line(
+    pytester: pytest.Pytester,
+) -> None:
+    pytester.makepyfile(
+        """
+        def test_it(bus):
+            bus.send(10, "m40")
+            bus.expect(node=10, position=40, within="1 s")
+        """
+    )
+    pytester.runpytest("--sacbus-record=seen").assert_outcomes(passed=1)
+    (file,) = (pytester.path / "seen").iterdir()
+    file.unlink()
+    file.symlink_to("/dev/full")
+    result = pytester.runpytest("--sacbus-record=seen")
+    result.assert_outcomes(passed=1, errors=1)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    assert (
+        f"sacbus: the recording seen/{file.name} could not be begun: No space left on device, "
+        "nothing is kept, record elsewhere"
+    ) in result.outlines
+    assert "Traceback" not in result.stdout.str()
+
+
+def test_tests_of_one_name_in_files_of_one_name_are_recorded_apart(
+    pytester: pytest.Pytester,
+) -> None:
+    test = (
+        'import pytest\n@pytest.mark.parametrize("x", ["a b", "a-b"])\ndef test_it(bus, x): pass\n'
+    )
+    places = ["there/left/test_same.py", "there/right/test_same.py", "there-right/test_same.py"]
+    for place in places:
+        path = pytester.path / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(test)
+    root = pytester.mkdir("root")
+    (root / "pytest.ini").write_text(
+        "[pytest]\naddopts = -p no:randomly -p no:cacheprovider\n"
+        "asyncio_default_fixture_loop_scope = function\n"
+    )
+    given = ["--import-mode=importlib", "-c", str(root / "pytest.ini"), "--sacbus-record=seen"]
+    directories = [str((pytester.path / place).parent) for place in places]
+    pytester.runpytest(*given, *directories).assert_outcomes(passed=6)
+    seen = {file.name for file in (pytester.path / "seen").iterdir()}
+    assert len(seen) == 6
+    # Stable: whatever else is run, and in whatever order.
+    for directory in reversed(directories):
+        pytester.runpytest(*given, directory).assert_outcomes(passed=2)
+    assert {file.name for file in (pytester.path / "seen").iterdir()} == seen
 
 
 # ---- cost ----

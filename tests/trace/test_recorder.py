@@ -6,7 +6,9 @@ import asyncio
 import contextlib
 import errno
 import json
-from io import BytesIO
+import re
+from contextlib import AsyncExitStack
+from io import BytesIO, FileIO
 from pathlib import Path
 
 import pytest
@@ -14,9 +16,9 @@ import pytest
 from sacbus.bus import BitErrors, Dead, NoiseBursts, WrongBaud
 from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.host import run_virtual
-from sacbus.kernel import SECOND, Kernel
+from sacbus.kernel import SECOND, Kernel, Ns
 from sacbus.mother import Mother, MotherError
-from sacbus.trace import Recorder, Recording, read
+from sacbus.trace import Recorder, Recording, RecordingCutOff, read
 from sacbus.trace.difference import differences
 from sacbus.trace.records import Driven, Ended, FaultSet, Mark, Moved, Sent, Switched, Told, Turned
 from tests.trace.rig import recorded, two_axes
@@ -199,8 +201,88 @@ def test_a_full_disk_ends_the_recording_and_not_the_bus() -> None:
         assert recorder.fault is not None
         assert bus.snapshot(10).position_pulses == 60
 
-    recorded(play, sink=Full(3_000))
-    assert reports.count("the recording ends here: No space left on device") == 1
+    sink = Full(3_000)
+    recording = recorded(play, sink=sink)
+    (told,) = [text for text in reports if text.startswith("the recording")]
+    found = re.fullmatch(
+        r"the recording ends at (\d\.\d{6}) s: No space left on device, "
+        "what came before is kept, record elsewhere",
+        told,
+    )
+    assert found is not None
+    assert list(recording)
+    assert abs(recording.end - float(found[1]) * SECOND) < 1_000
+    assert not recording.whole
+
+
+def test_whoever_asks_is_told_at_once_that_nothing_more_can_be_written() -> None:
+    told: list[tuple[Ns, RecordingCutOff]] = []
+
+    async def main() -> None:
+        async with open_bus(Configuration(nodes=(10, 11))) as bus:
+            kernel = bus.bus.kernel
+            recorder = Recorder(
+                bus, Full(0), cut_off=lambda fault: told.append((kernel.now, fault))
+            )
+            recorder.flush()
+            begun = kernel.now
+            await asyncio.sleep(0.5)
+            recorder.mark("no room for it")
+            recorder.flush()
+            assert len(told) == 1
+            await asyncio.sleep(0.5)
+            recorder.mark("nor for this")
+            recorder.close()
+            ((when, fault),) = told
+            assert fault is recorder.fault
+            assert fault.kept == begun
+            assert when - begun == pytest.approx(SECOND // 2, abs=1)
+            assert fault.reason == "No space left on device"
+
+    run_virtual(Kernel(), main())
+
+
+def test_a_disk_without_any_room_keeps_nothing_even_of_many_nodes() -> None:
+    told: list[RecordingCutOff] = []
+
+    async def main() -> None:
+        # What these tell at their beginning is more than what is written together.
+        nodes = [range(20, 240), range(20, 240), range(20, 240)]
+        async with AsyncExitStack() as stack:
+            buses = [
+                await stack.enter_async_context(
+                    open_bus(Configuration(name=str(number), nodes=tuple(some)))
+                )
+                for number, some in enumerate(nodes)
+            ]
+            recorder = Recorder(buses, Full(-1), cut_off=told.append)
+            assert not any(bus.bus.medium.watchers for bus in buses)
+            recorder.close()
+
+    run_virtual(Kernel(), main())
+    (fault,) = told
+    assert fault.kept is None
+    assert str(fault) == (
+        "the recording could not be begun: No space left on device, nothing is kept, "
+        "record elsewhere"
+    )
+
+
+def test_a_sink_without_a_buffer_is_written_whole_and_read_back(tmp_path: Path) -> None:
+    class Grudging(FileIO):
+        """Takes a few bytes at a time, as a pipe may."""
+
+        def write(self, data: object, /) -> int:
+            assert isinstance(data, bytes)
+            return super().write(data[:1_000])
+
+    whole = BytesIO()
+    recorded(two_axes, sink=whole)
+    with Grudging(tmp_path / "run.jsonl", "w+b") as sink:
+        recording = recorded(two_axes, sink=sink)
+        assert [type(one) for one in recording] == [type(one) for one in read(whole)]
+        assert recording.whole
+    assert (tmp_path / "run.jsonl").read_bytes() == whole.getvalue()
 
 
 def test_lines_are_written_within_a_second_of_bus_time() -> None:
