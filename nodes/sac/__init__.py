@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from nodes.sac.movement import SacSegment, SacShape
@@ -23,6 +23,11 @@ class SacKind:
     summary = "SAC single-axis stepper controller"
     protocol = SAC_PROTOCOL
     settings = SacSettings
+    #: Those of the motion engine (manual, "Profile Planning"), and what keeps it from running.
+    states: Final[Sequence[str]] = (
+        *("STANDBY", "ACCEL", "CRUISE", "DECEL", "STOP"),
+        *("SYNC", "BOOT", "OFF"),
+    )
     #: Sync is released by a low level.
     drawn: Final[Mapping[str, int]] = {"sync": 1}
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
+from nodes.superstepper.course import ACCEL, CRUISE, DECEL
 from nodes.superstepper.movement import Shape, SuperStepperSegment
 from nodes.superstepper.node import SuperStepperNode
 from nodes.superstepper.protocol import EIGHT_BITS, NINE_BITS, SuperStepperProtocol
 from nodes.superstepper.settings import SuperStepperSettings
 from nodes.superstepper.words import memory_words
 from sacbus.kernel import LineRate, Ns
-from sacbus.node import MemoryWords, Report
+from sacbus.node import OFF, STANDBY, MemoryWords, Report
 
 __all__ = [
     "KIND",
@@ -31,6 +32,8 @@ class SuperStepperKind:
     protocol = EIGHT_BITS
     protocols = (EIGHT_BITS, NINE_BITS)
     settings = SuperStepperSettings
+    #: Those of the engine, and without power.
+    states: Final[Sequence[str]] = (STANDBY, ACCEL, CRUISE, DECEL, OFF)
     #: The home sensor is asserted low.
     drawn: Final[Mapping[str, int]] = {"home": 1}
 

@@ -91,6 +91,11 @@ class NodeKind(Contract):
         ...
 
     @property
+    def states(self) -> Sequence[str]:
+        """All states that a node of it can be in (:meth:`Node.state`), the most usual first."""
+        ...
+
+    @property
     def settings(self) -> type[NodeSettings]:
         """The settings that a configuration may give."""
         ...

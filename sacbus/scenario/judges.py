@@ -36,11 +36,9 @@ from sacbus.scenario.expectations import (
 from sacbus.scenario.line import Passed
 from sacbus.scenario.motion import deviation, start_skew
 from sacbus.scenario.quantity import Bounds, time_text
+from sacbus.trace import RESTS
 
 __all__ = ["Judge", "judge"]
-
-#: States in which a node does nothing until something is done to it, unless it is to wake.
-_RESTS: Final = frozenset({"STANDBY", "SYNC", "OFF"})
 
 #: How often a node that rests is looked at all the same: somebody may type at its terminal who is
 #: not in the scenario.
@@ -196,7 +194,7 @@ class _NodeLook:
     def rests(self) -> bool:
         now = self._clock.now
         return all(
-            panel.node.wake_at() is None and panel.node.state(now) in _RESTS
+            panel.node.wake_at() is None and panel.node.state(now) in RESTS
             for panel in self._panels.values()
         )
 

@@ -304,7 +304,7 @@ EXPECT: Final = (
         "state",
         'a text such as "STANDBY"',
         _is_name,
-        "STANDBY, ACCEL, CRUISE, DECEL, STOP, SYNC, BOOT, OFF",
+        "STANDBY, ACCEL, CRUISE, DECEL, STOP, SYNC, BOOT, OFF: one that the node's kind has",
     ),
     Key(
         "pin",

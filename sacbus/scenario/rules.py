@@ -231,8 +231,10 @@ class _Rules:
                 yield from self._drives(bus, nodes, "enA", 1)
             case Power(nodes=nodes):
                 yield from self._nodes(bus, nodes, "power")
-            case NodeIs(nodes=nodes, pins=pins):
+            case NodeIs(nodes=nodes, state=state, pins=pins):
                 yield from self._nodes(bus, nodes, key or "expect")
+                if state is not None:
+                    yield from self._has_state(bus, nodes, state, key or "expect")
                 yield from self._has_pins(bus, nodes, pins, key or "expect")
             case Counted(nodes=nodes):
                 if nodes is not None:
@@ -309,6 +311,15 @@ class _Rules:
                 node.pins.drive(pin, level, 0)
             except PinError as wrong:
                 yield "pin", str(wrong), "correct it"
+                return
+
+    def _has_state(
+        self, bus: Configuration, nodes: Iterable[int], state: str, key: str
+    ) -> Iterator[_Found]:
+        for at in bus.every_node:
+            if at.address in nodes and state not in (there := self._kind(at.kind).states):
+                what = f"expected a state of node {at.address} ({', '.join(there)}), got {state!r}"
+                yield f"{key}.state", what, "correct it"
                 return
 
     def _has_pins(

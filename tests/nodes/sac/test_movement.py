@@ -78,6 +78,7 @@ class Floor:
     def recorded(self, at: Ns) -> tuple[object, ...]:
         """The same, from what it told."""
         track = self.track
+        assert track.state(at) in KIND.states
         return (
             track.position(at),
             track.steps(at),

@@ -73,6 +73,7 @@ def test_what_is_told_answers_as_the_module_did(commands: list[tuple[Message, Ns
             assert segment.steps(now) == segment.rotor(now) == seen.position_steps
             assert segment.rpm(now) == seen.rpm
             assert segment.state(now) == seen.state == bench.node.state(now)
+            assert seen.state in KIND.states
             levels = {pin: bench.node.pins.level(pin, now) for pin in bench.node.pins.told}
             assert segment.levels(now) == levels
     steps = tape.track.pulses(0, bench.now + 1).tolist()
