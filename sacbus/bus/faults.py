@@ -12,18 +12,16 @@ from typing import Final
 
 from sacbus.bus.damage import BitErrors, Delay, Drop, Duplicate, SwappedReply
 from sacbus.bus.disturbers import Babble, NoiseBursts
+from sacbus.bus.duration import TIME, DurationError, duration
 from sacbus.bus.fault import Fault, FaultError
 from sacbus.bus.hearing import Cut, Dead, Echo, LateDirection, Latency, WrongBaud
-from sacbus.kernel import MS, SECOND, US, Ns
+from sacbus.kernel import Ns
 
 __all__ = ["FAULTS", "fault_from"]
 
 #: The address of whoever is on the line without being a node.
 STRANGER: Final = "stranger"
 
-_UNITS: Final[Mapping[str, Ns]] = {"ns": 1, "us": US, "ms": MS, "s": SECOND}
-_TIME: Final = re.compile(r"(\d{1,12})(?:\.(\d{1,9}))? ?(ns|us|ms|s)")
-_A_TIME: Final = 'a time with its unit such as "16 ms"'
 _HEX: Final = re.compile(r"[0-9a-fA-F]{2}( ?[0-9a-fA-F]{2})*")
 
 
@@ -51,16 +49,11 @@ class _Values:
         return value
 
     def time(self, name: str) -> Ns:
-        value = self._take(name, _A_TIME, None)
-        found = _TIME.fullmatch(value) if isinstance(value, str) else None
-        if found is None:
-            raise self._wrong(name, _A_TIME, value)
-        unit, parts = _UNITS[found[3]], found[2] or "0"
-        scale: int = 10 ** len(parts)
-        part, beyond = divmod(int(parts) * unit, scale)
-        if beyond:
-            raise self._wrong(name, "a time in whole ns", value)
-        return int(found[1]) * unit + part
+        value = self._take(name, TIME, None)
+        try:
+            return duration(value)
+        except DurationError as wrong:
+            raise self._wrong(name, wrong.expected, value) from wrong
 
     def address(self, name: str) -> int:
         return self._checked(name, self._take(name, "an address, 1 to 255", None))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -28,23 +27,17 @@ __all__ = [
     "span",
 ]
 
-_UNITS: Final = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
-_SPAN: Final = re.compile(r"(\d{1,9})(?:\.(\d{1,9}))?\s*(ns|us|ms|s)")
-
 
 def span(_ctx: click.Context, _param: click.Parameter, given: str) -> int:
-    """A length of time as ns: ``10ms``, ``1.5 us``."""
+    """A length of time as ns: ``10ms``, ``1.5 us``; 0 is one without a unit too."""
     if given == "0":
         return 0
-    found = _SPAN.fullmatch(given.strip())
-    if found is None:
-        raise click.BadParameter(f"expected a time such as 1us, 10ms or 2s, got {given!r}")
-    whole, fraction, unit = found[1], found[2] or "", found[3]
-    factor = _UNITS[unit]
-    part, beyond = divmod(int(fraction or 0) * factor, int("1" + "0" * len(fraction)))
-    if beyond:
-        raise click.BadParameter(f"expected whole ns, got {given!r}")
-    return int(whole) * factor + part
+    from sacbus.bus.duration import DurationError, duration
+
+    try:
+        return duration(given)
+    except DurationError as wrong:
+        raise click.BadParameter(f"expected {wrong.expected}, got {given!r}") from wrong
 
 
 def opened(path: str) -> Recording:

@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from sacbus.bus.duration import time_text
 from sacbus.config.notation import ranges
 from sacbus.kernel import Ns
-from sacbus.scenario.quantity import Bounds, time_text
+from sacbus.scenario.quantity import Bounds
 
 __all__ = [
     "COUNTS",

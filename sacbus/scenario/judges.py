@@ -17,6 +17,7 @@ from collections.abc import Callable
 from typing import Final, assert_never
 from typing import Protocol as Contract
 
+from sacbus.bus.duration import time_text
 from sacbus.kernel import MS, Ns
 from sacbus.node import Said
 from sacbus.panel import Panel
@@ -35,7 +36,7 @@ from sacbus.scenario.expectations import (
 )
 from sacbus.scenario.line import Passed
 from sacbus.scenario.motion import deviation, start_skew
-from sacbus.scenario.quantity import Bounds, time_text
+from sacbus.scenario.quantity import Bounds
 from sacbus.trace import RESTS
 
 __all__ = ["Judge", "judge"]

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from sacbus.bus.duration import TIME
 from sacbus.config.keys import Key
 from sacbus.config.notation import NotationError, addresses
 from sacbus.scenario.parameters import RESERVED, is_value
-from sacbus.scenario.quantity import TIME, QuantityError, bounds, marked_bytes, nanoseconds
+from sacbus.scenario.quantity import QuantityError, bounds, marked_bytes, nanoseconds
 
 __all__ = [
     "DEEDS",

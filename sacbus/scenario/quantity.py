@@ -1,47 +1,21 @@
-"""Times, bounds and bytes as people write them: ``"250 ms"``, ``[399, 401]``, ``"^18 0c"``.
+"""Bounds and bytes as people write them, ``[399, 401]``, ``"^18 0c"``, and times in a scenario.
 
-Owns these notations, both ways. A QuantityError says what was expected and what came; who asked
-adds the place. Times are whole ns: what a text says beyond that is refused, never rounded.
+Owns these notations, both ways; that of times is the bus's (``sacbus/bus/duration.py``). A
+QuantityError says what was expected and what came; who asked adds the place.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from fractions import Fraction
 from math import inf, isfinite
-from typing import Final, TypeGuard
+from typing import TypeGuard
 
+from sacbus.bus.duration import DurationError, duration
 from sacbus.config.keys import shown
-from sacbus.kernel import MS, SECOND, US, Ns
+from sacbus.kernel import Ns
 
-__all__ = [
-    "LONGEST",
-    "TIME",
-    "Bounds",
-    "QuantityError",
-    "bounds",
-    "marked_bytes",
-    "nanoseconds",
-    "time_text",
-]
-
-#: How a time is asked for.
-TIME: Final = 'a time such as "250 ms" (ns, us, ms, s, min, h)'
-
-#: The longest time, a year: bus time in float seconds is exact to 4 ns until then.
-LONGEST: Final[Ns] = 366 * 24 * 3_600 * SECOND
-
-_UNITS: Final = {
-    "ns": 1,
-    "us": US,
-    "µs": US,
-    "ms": MS,
-    "s": SECOND,
-    "min": 60 * SECOND,
-    "h": 3_600 * SECOND,
-}
-_TIME: Final = re.compile(r"\s*([0-9]{1,20}(?:\.[0-9]{1,12})?)\s*([a-zµ]+)\s*")
+__all__ = ["Bounds", "QuantityError", "bounds", "marked_bytes", "nanoseconds"]
 
 
 class QuantityError(ValueError):
@@ -49,27 +23,11 @@ class QuantityError(ValueError):
 
 
 def nanoseconds(value: object) -> Ns:
-    """``"1.5 s"`` in ns. 0 needs its unit as well, so that nobody has to guess."""
-    found = _TIME.fullmatch(value) if isinstance(value, str) else None
-    if found is None or found[2] not in _UNITS:
-        raise QuantityError(f"expected {TIME}, got {shown(value)}")
-    ns = Fraction(found[1]) * _UNITS[found[2]]
-    if ns.denominator != 1:
-        raise QuantityError(f"expected a whole number of ns, got {shown(value)}")
-    if ns > LONGEST:
-        raise QuantityError(f"expected a time of at most a year, got {shown(value)}")
-    return int(ns)
-
-
-def time_text(ns: Ns) -> str:
-    """A time in the largest unit that fits into it, exactly: ``250 ms``, ``1.5 s``, ``0 s``."""
-    for unit, size in (("s", SECOND), ("ms", MS), ("us", US)):
-        if ns >= size:
-            whole, rest = divmod(ns, size)
-            # The digits of the rest, with the zeros before them that the 1 of ``size`` holds up.
-            digits = f"{size + rest}"[1:].rstrip("0")
-            return f"{whole}.{digits} {unit}" if digits else f"{whole} {unit}"
-    return f"{ns} ns" if ns else "0 s"
+    """``"1.5 s"`` in ns, as :func:`~sacbus.bus.duration.duration` reads it."""
+    try:
+        return duration(value)
+    except DurationError as wrong:
+        raise QuantityError(f"expected {wrong.expected}, got {shown(value)}") from wrong
 
 
 @dataclass(frozen=True, slots=True)

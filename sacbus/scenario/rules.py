@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from sacbus.bus import Fault
+from sacbus.bus.duration import time_text
 from sacbus.config.mistake import ConfigError, Mistake
 from sacbus.config.notation import ranges
 from sacbus.configuration import Configuration, check
@@ -30,7 +31,6 @@ from sacbus.scenario.expectations import (
     Together,
 )
 from sacbus.scenario.play import predecessors
-from sacbus.scenario.quantity import time_text
 from sacbus.scenario.values import (
     Deed,
     Disturb,

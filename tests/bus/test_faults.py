@@ -29,6 +29,7 @@ from sacbus.bus import (
     WrongBaud,
     fault_from,
 )
+from sacbus.bus.duration import TIME
 from sacbus.kernel import MS, SECOND, US, Ns
 from sacbus.wire import MOTHER, ack, nak
 from tests.nodes.sac.bench import Bench, packet
@@ -229,7 +230,7 @@ WRONG: list[tuple[Mapping[str, object], str]] = [
     ({"drop": float("nan")}, "fault 'drop': expected a probability over 0, up to 1, got nan"),
     (
         {"delay": 0.5},
-        "fault 'delay.up_to': expected a time with its unit such as \"16 ms\", got nothing",
+        f"fault 'delay.up_to': expected {TIME}, got nothing",
     ),
     (
         {"delay": {"rate": 0.5, "up_to": "0 s"}},
@@ -237,7 +238,7 @@ WRONG: list[tuple[Mapping[str, object], str]] = [
     ),
     (
         {"latency": 16},
-        "fault 'latency.by': expected a time with its unit such as \"16 ms\", got 16",
+        f"fault 'latency.by': expected {TIME}, got 16",
     ),
     (
         {"latency": {"by": "1 ms", "of": "a"}},
@@ -261,11 +262,11 @@ WRONG: list[tuple[Mapping[str, object], str]] = [
     ),
     (
         {"latency": {"by": "0.5 ns"}},
-        "fault 'latency.by': expected a time in whole ns, got '0.5 ns'",
+        "fault 'latency.by': expected a whole number of ns, got '0.5 ns'",
     ),
     (
         {"latency": {"by": "9" * 13 + "s"}},
-        "fault 'latency.by': expected a time with its unit such as \"16 ms\", got '9999999999999s'",
+        "fault 'latency.by': expected a time of at most a year, got '9999999999999s'",
     ),
     (
         {"noise_bursts": {"per_second": 1, "bytes": 0}},
