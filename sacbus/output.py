@@ -16,6 +16,7 @@ from typing import Any, Final
 from sacbus import __version__
 from sacbus.config.notation import ranges
 from sacbus.daemon import HostedBus
+from sacbus.feed.lines import report_fields
 from sacbus.kernel import MS, SECOND, US, Ns
 from sacbus.lateness import Lateness
 from sacbus.links import Link
@@ -142,19 +143,8 @@ class Json(Lines):
         )
 
     def report(self, bus: HostedBus, report: Report) -> None:
-        """Event ``report``."""
-        self._write(
-            {
-                "event": "report",
-                "bus": bus.bus.name,
-                "time_us": report.when / 1_000,
-                "node": report.address,
-                "what": report.kind.value,
-                "line": report.line,
-                "column": report.column,
-                "text": report.text,
-            }
-        )
+        """Event ``report``, as in the feed."""
+        self._write(report_fields(report, bus.bus.name))
 
     def late(self, bus: HostedBus, late: Ns) -> None:
         """Event ``late``."""

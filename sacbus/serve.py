@@ -9,8 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
-import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from functools import partial
 from pathlib import Path
@@ -20,19 +19,14 @@ from sacbus.daemon import Configuration, HostedBus, open_bus
 from sacbus.feed import FeedServer
 from sacbus.notify import notify
 from sacbus.output import output_for
+from sacbus.signals import heed_signals
 from sacbus.spare import at_once, in_spare_time
 from sacbus.trace.recorder import Recorder
 
 __all__ = ["serve"]
 
-#: Status after Ctrl-C, as a shell expects it (128 + SIGINT).
-INTERRUPTED: Final = 130
-
 #: Seconds after which what has been recorded is in its file, also when nothing more happens.
 SAVED_EVERY: Final = 0.5
-
-#: Status after the terminal was closed (128 + SIGHUP).
-HUNG_UP: Final = 129
 
 
 async def serve(
@@ -61,7 +55,7 @@ async def serve(
             ended.set_exception(fault)
 
     # Before anything is opened: a signal at any instant ends in an orderly close.
-    _heed_signals(end)
+    heed_signals(end)
     async with AsyncExitStack() as stack:
         buses = [await stack.enter_async_context(open_bus(one)) for one in configurations]
         recorder = None
@@ -111,13 +105,3 @@ async def _boot(buses: Sequence[HostedBus], ended: asyncio.Future[int]) -> None:
     booting.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await booting
-
-
-def _heed_signals(end: Callable[[int], None]) -> None:
-    loop = asyncio.get_running_loop()
-    # Windows has no such handlers; there asyncio.run ends the task on Ctrl-C.
-    with contextlib.suppress(NotImplementedError):
-        loop.add_signal_handler(signal.SIGINT, end, INTERRUPTED)
-        loop.add_signal_handler(signal.SIGTERM, end, 0)
-        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup leaves it
-            loop.add_signal_handler(signal.SIGHUP, end, HUNG_UP)

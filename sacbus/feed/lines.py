@@ -11,7 +11,7 @@ import json
 from dataclasses import dataclass
 from typing import Any, Final
 
-from sacbus.kernel import Ns
+from sacbus.kernel import US, Ns
 from sacbus.node import Report, ReportKind
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "Way",
     "decode",
     "encode",
+    "report_fields",
 ]
 
 #: Counts changes that old readers cannot bear.
@@ -116,17 +117,7 @@ def _fields(line: Line, bus: str) -> dict[str, object]:
         case Sent():
             return _sent(line)
         case Report():
-            # As `serve --json` prints it.
-            return {
-                "event": "report",
-                "bus": bus,
-                "time_us": line.when / 1_000,
-                "node": line.address,
-                "what": line.kind.value,
-                "line": line.line,
-                "column": line.column,
-                "text": line.text,
-            }
+            return report_fields(line, bus)
         case Reached(time, clock):
             return {"event": "time", "time_ns": time, "clock_ns": clock}
         case Missed(lines):
@@ -152,6 +143,20 @@ def _fields(line: Line, bus: str) -> dict[str, object]:
                 "time_ns": line.time,
                 "clock_ns": line.clock,
             }
+
+
+def report_fields(report: Report, bus: str) -> dict[str, object]:
+    """A report as an object of JSON, in the feed of that bus and wherever else it is printed."""
+    return {
+        "event": "report",
+        "bus": bus,
+        "time_us": report.when / US,
+        "node": report.address,
+        "what": report.kind.value,
+        "line": report.line,
+        "column": report.column,
+        "text": report.text,
+    }
 
 
 def _sent(line: Sent) -> dict[str, object]:
@@ -214,7 +219,7 @@ def _line(event: str, fields: dict[str, Any]) -> Line | None:
             )
         case "report":
             return Report(
-                round(fields["time_us"] * 1_000),
+                round(fields["time_us"] * US),
                 fields["node"],
                 ReportKind(fields["what"]),
                 fields["text"],

@@ -8,9 +8,6 @@ line.
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import signal
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,13 +16,10 @@ from sacbus.links import LinkError
 from sacbus.monitor.output import Output
 from sacbus.monitor.sources import watch_feed, watch_link
 from sacbus.monitor.wanted import Wanted
+from sacbus.signals import heed_signals
 from sacbus.watch import Summary
 
 __all__ = ["monitor"]
-
-#: Statuses after Ctrl-C and after the terminal was closed, as a shell expects them.
-INTERRUPTED: Final = 130
-HUNG_UP: Final = 129
 
 #: Seconds between two looks for what is waited for.
 RETRY: Final = 0.5
@@ -48,7 +42,7 @@ async def monitor(wanted: Wanted) -> int:
         if not ended.done():
             ended.set_exception(fault)
 
-    _heed_signals(end)
+    heed_signals(end)
     output = Output(wanted, lost)
     session = _Session(wanted, output)
     looking = asyncio.create_task(session.run())
@@ -134,13 +128,3 @@ class _Session:
 
 def _may_be_there(link: str) -> bool:
     return "://" in link or Path(link).exists()
-
-
-def _heed_signals(end: Callable[[int], None]) -> None:
-    loop = asyncio.get_running_loop()
-    # Windows has no such handlers; there asyncio.run ends the task on Ctrl-C.
-    with contextlib.suppress(NotImplementedError):
-        loop.add_signal_handler(signal.SIGINT, end, INTERRUPTED)
-        loop.add_signal_handler(signal.SIGTERM, end, 0)
-        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup leaves it
-            loop.add_signal_handler(signal.SIGHUP, end, HUNG_UP)

@@ -37,7 +37,11 @@ _OUTCOMES: Final[Mapping[type, Outcome]] = {
 
 
 class Polling:
-    """Lines sent in turn at a pace. Each costs an appointment, and no task of a loop."""
+    """Lines sent in turn, one every so often, each once the one before it has come to its end.
+
+    Where that took longer than the pace allows, the next ones follow at once until it is made up
+    for. A line costs one appointment besides those of its exchange, and no task of a loop.
+    """
 
     def __init__(self, bench: Bench, poll: Poll, failed: Callable[[str, str], None]) -> None:
         self._bench = bench
