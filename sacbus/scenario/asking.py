@@ -55,6 +55,7 @@ class Polling:
         self._stopped = False
 
     def begin(self, goes_on: Callable[[], bool]) -> None:
+        """Ask from now on, as long as ``goes_on()`` holds and nobody stops it."""
         self._goes_on = goes_on
         self._due = self._bench.clock.now
         self._ask()

@@ -240,6 +240,8 @@ class Play:
         )
         self.result.failures.append(failure)
         self.result.looked.append(failure)
+        if bench.tape is not None:
+            bench.tape.failed(expected, got, step.name, bench.name)
 
     def _states(self, bench: Bench, deed: object) -> tuple[str, ...]:
         """The nodes that a step is about, as they are now; the last warnings if it counts them."""

@@ -37,6 +37,11 @@ class Tape:
         """The number of a bus in the recording."""
         return self._numbers[bus]
 
+    def failed(self, expected: str, got: str, step: str, bus: str) -> None:
+        """Remark, now, what came instead of what was expected; ``step``: its name, if any."""
+        details = {"step": step} if step else {}
+        self.recorder.mark(f"expected {expected}, got {got}", bus=self.number(bus), **details)
+
     def tracks(self, bus: str) -> Mapping[int, Track]:
         """Where the nodes of a bus have been until now, by their configured addresses."""
         self.recorder.flush()

@@ -274,6 +274,7 @@ class VirtualBus:
     def _settle(self, one: Expectation, got: str | None) -> None:
         __tracebackhide__ = True
         if got is not None:
+            self._tape.failed(str(one), got, "", self._bench.name)
             raise AssertionError(f"expected {one}, got {got}, at {self.instant}")
 
     def _outcome(

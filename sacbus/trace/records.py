@@ -162,7 +162,11 @@ class FaultSet:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a request of mother's: ``result`` in a word, ``ack``, ``nak``, ``silence``."""
+    """What became of a request of mother's, after so many attempts.
+
+    ``result`` as a scenario has it: ``ack``, ``nak``, ``no answer``, ``unknown``, ``lost``; or
+    ``sent``, to all, who do not answer.
+    """
 
     when: Ns
     bus: int
@@ -174,7 +178,10 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A remark of whoever records: a step of a scenario, an expectation that failed."""
+    """A remark of whoever records: a scenario's ``mark``, or an expectation that failed.
+
+    ``details`` of the latter: the name of its ``step``, where it has one.
+    """
 
     when: Ns
     bus: int

@@ -22,6 +22,7 @@ from sacbus.scenario import (
     run,
 )
 from sacbus.trace.records import Mark as Marked
+from sacbus.trace.records import Outcome as Told
 from tests.scenario.stage import failures, played, scenario
 
 
@@ -253,6 +254,50 @@ def test_faults_are_put_on_and_lifted_by_the_names_of_steps(file: Path) -> None:
         """
     assert failures(file, text) == []
     assert len(failures(file, text.replace("lift", "mark"))) == 1
+
+
+def test_an_expectation_that_failed_is_marked_in_the_recording(file: Path) -> None:
+    text = """
+        [[step]]
+        mark = "here"
+        [[step]]
+        name = "there"
+        expect = { node = 10, position = 40, within = "5 ms" }
+        [[step]]
+        expect = { node = 11, position = 0 }
+        """
+    result = run(scenario(file, text), record=BytesIO())
+    assert result.recording is not None
+    found = [record for record in result.recording if isinstance(record, Marked)]
+    assert [(one.when // MS, one.text, one.details) for one in found] == [
+        (0, "here", {}),
+        (
+            5,
+            "expected node 10: position 40 within 5 ms, got position 0, state STANDBY",
+            {"step": "there"},
+        ),
+    ]
+
+
+def test_what_became_of_each_line_is_in_the_recording_in_a_word(file: Path) -> None:
+    text = """
+        [[step]]
+        send = ["10V10", "0V10"]
+        [[step]]
+        fault = { dead = 11 }
+        [[step]]
+        send = "11V10"
+        outcome = "no answer"
+        """
+    result = run(scenario(file, text), record=BytesIO())
+    assert result.recording is not None
+    found = [record for record in result.recording if isinstance(record, Told)]
+    assert [(one.node, one.body, one.result) for one in found] == [
+        (10, b"V10", "ack"),
+        (0, b"V10", "sent"),
+        (11, b"V10", "no answer"),
+    ]
+    assert found[-1].attempts > 1
 
 
 def test_a_queue_file_comes_into_the_queue(file: Path) -> None:

@@ -13,6 +13,8 @@ import pytest
 import nodes.sac  # noqa: F401
 import sacbus.testing.files
 import sacbus.testing.made  # noqa: F401
+from sacbus.trace import read
+from sacbus.trace.records import Mark
 from tests.full_disk import needs_full_device
 
 pytest_plugins = ["pytester"]
@@ -480,6 +482,19 @@ def test_each_bus_is_recorded_where_asked_the_same_in_every_run(
     lines = [json.loads(line) for line in texts[0][0].splitlines()]
     assert lines[0]["sacbus"] == "recording"
     assert lines[-1]["is"] == "end"
+
+
+def test_an_expectation_that_failed_is_marked_in_the_recording(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        def test_it(bus):
+            bus.expect(node=10, position=40, within="5 ms")
+        """
+    )
+    pytester.runpytest("--sacbus-record=seen").assert_outcomes(failed=1)
+    (file,) = (pytester.path / "seen").iterdir()
+    (mark,) = [one for one in read(file) if isinstance(one, Mark)]
+    assert mark.text == "expected node 10: position 40 within 5 ms, got position 0, state STANDBY"
 
 
 @needs_full_device
