@@ -7,6 +7,7 @@ import os
 import re
 import resource
 import signal
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
 from itertools import pairwise
@@ -205,6 +206,57 @@ def test_an_export_goes_through_a_pipe(recording: Path, tmp_path: Path, option: 
         assert run(["export", str(recording), option, str(place)]) == 0
         assert got.result(10) == place.read_bytes() != b""
     assert pipe.is_fifo()
+
+
+@pytest.mark.parametrize("option", EXPORTS[:4])
+def test_an_export_goes_to_standard_output(
+    recording: Path, tmp_path: Path, capfdbinary: pytest.CaptureFixture[bytes], option: str
+) -> None:
+    place, beside = tmp_path / "out", tmp_path / "beside"
+    assert run(["export", str(recording), option, str(place)]) == 0
+    capfdbinary.readouterr()
+    other = "--csv" if option != "--csv" else "--vcd"
+    assert run(["export", str(recording), option, "-", other, str(beside)]) == 0
+    out, err = capfdbinary.readouterr()
+    assert out == place.read_bytes() != b""
+    assert err.startswith(f"{beside}: ".encode())
+    assert err.count(b"\n") == 1
+    assert sorted(tmp_path.iterdir()) == sorted([recording, place, beside])
+
+
+def test_two_exports_do_not_go_to_standard_output(recording: Path, capsys: Captured) -> None:
+    for one, other in pairwise(EXPORTS):
+        assert run(["export", str(recording), one, "-", other, "-"]) == 2
+        assert capsys.readouterr() == (
+            "",
+            (
+                f"error: expected one on standard output, got {one} and {other}, "
+                "give others a file, see sacbus export --help\n"
+            ),
+        )
+
+
+def test_a_picture_takes_a_file_and_a_capture_no_terminal(
+    recording: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run(["export", str(recording), "--plot", "-"]) == 2
+    assert "-, give a name that ends in .png or .svg" in capsys.readouterr().err
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert run(["export", str(recording), "--pcap", "-"]) == 2
+    assert "--pcap - writes bytes that are not for a terminal" in capsys.readouterr().err
+
+
+def test_what_is_served_is_recorded_into_a_file_of_its_own(
+    tmp_path: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    config = tmp_path / "bus.toml"
+    config.write_text("[[bus]]\n")
+    for place in ("-", str(config)):
+        assert run(["serve", str(config), "--record", place]) == 2
+        assert "error: --record: expected a file" in capsys.readouterr().err
+    assert config.read_text() == "[[bus]]\n"
+    assert list(tmp_path.iterdir()) == [config]
 
 
 def test_exports_to_devices_go_on_working(recording: Path) -> None:

@@ -248,6 +248,29 @@ def test_two_outputs_are_not_written_to_one_file(
     assert list(tmp_path.iterdir()) == [file]
 
 
+@pytest.mark.parametrize("option", OUTPUTS[:-1])
+def test_what_is_kept_does_not_go_among_the_verdicts(
+    file: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch, option: str
+) -> None:
+    monkeypatch.chdir(file.parent)
+    assert run(["run", str(file), option, "-"]) == 2
+    assert capsys.readouterr() == (
+        "",
+        (
+            f"error: {option}: expected a file, got -, where its results are told, "
+            "see sacbus run --help\n"
+        ),
+    )
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_two_results_do_not_go_to_standard_output(file: Path, capsys: Captured) -> None:
+    assert run(["run", str(file), "--json", "--junit", "-"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("error: --json: expected --junit to be a file, got standard output")
+
+
 def test_devices_and_standard_output_may_be_shared(file: Path, capsys: Captured) -> None:
     shared = ["--vcd", "/dev/null", "--pcap", "/dev/null", "--junit", "-"]
     assert run(["run", str(file), *shared]) == 0

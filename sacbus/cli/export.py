@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -11,6 +12,8 @@ import click
 
 from sacbus.cli.options import WrongInput, read_addresses, verbose
 from sacbus.cli.recordings import (
+    STANDARD,
+    fresh_or_standard,
     fresh_text,
     note_cut_off,
     opened,
@@ -111,8 +114,11 @@ def export_command(
 ) -> int:
     """Write a recording in other formats; several at once if wanted.
 
+    A FILE of - is standard output, for one of them; pictures take a file.
+
     \b
     Example: sacbus export run.jsonl --vcd run.vcd --csv run.csv
+             sacbus export run.jsonl --pcap - | wireshark -k -i -
     """
     from sacbus.trace import write_pcapng
     from sacbus.trace.tables import write_events, write_positions
@@ -129,15 +135,30 @@ def export_command(
         raise click.UsageError(
             "nothing to write: give --vcd, --csv, --positions, --pcap or --plot a file"
         )
+    standard = [
+        option for option, path in outputs.items() if path is not None and _is_standard(path)
+    ]
+    if len(standard) > 1:
+        raise click.UsageError(
+            f"expected one on standard output, got {' and '.join(standard)}, give others a file"
+        )
+    if standard == ["--pcap"] and sys.stdout.isatty():
+        raise click.UsageError(
+            "--pcap - writes bytes that are not for a terminal, "
+            "pipe them to a program (| wireshark -k -i -) or give --pcap a file"
+        )
     if picture is None and (xy is not None or nodes):
         raise click.UsageError(f"{'--nodes' if nodes else '--xy'}: expected only with --plot")
     if xy is not None and nodes:
         raise click.UsageError("expected --nodes or --xy, got both")
     if every == 0:
         raise click.BadParameter("expected a time above 0, got '0'", param_hint="--every")
-    refuse_shared_files(outputs, [recording])
+    refuse_shared_files(
+        {option: path for option, path in outputs.items() if option not in standard}, [recording]
+    )
     form = None if picture is None else picture_form(picture)
     read = opened(recording)
+    told: list[tuple[Path, str]] = []
     jobs: list[tuple[Path | None, str, Callable[[TextIO], int]]] = [
         (vcd, "changes of level", lambda out: write_vcd(read, out)),
         (events, "events", lambda out: write_events(read, out)),
@@ -146,17 +167,22 @@ def export_command(
     for path, what, write in jobs:
         if path is not None:
             with fresh_text(path) as out:
-                written = write(out)
-            click.echo(f"{path}: {written} {what}")
+                told.append((path, f"{write(out)} {what}"))
     if pcap is not None:
-        with fresh_file(pcap) as file:
-            written = write_pcapng(read, file)
-        click.echo(f"{pcap}: {written} packets")
+        with fresh_or_standard(pcap) as file:
+            told.append((pcap, f"{write_pcapng(read, file)} packets"))
     if picture is not None and form is not None:
         _draw(read, picture, form, nodes, xy)
-        click.echo(f"{picture}: drawn")
+        told.append((picture, "drawn"))
+    for path, what in told:
+        if not _is_standard(path):
+            click.echo(f"{path}: {what}", err=bool(standard))
     note_cut_off(read)
     return 0
+
+
+def _is_standard(path: Path | None) -> bool:
+    return path is not None and str(path) == STANDARD
 
 
 def _draw(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, BinaryIO, Final, TextIO
 
 import click
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from sacbus.trace import Recording
 
 __all__ = [
+    "STANDARD",
+    "fresh_or_standard",
     "fresh_text",
     "note_cut_off",
     "opened",
@@ -26,6 +29,10 @@ __all__ = [
     "refuse_shared_files",
     "span",
 ]
+
+
+#: The name of standard input and of standard output, where they stand for a file.
+STANDARD: Final = "-"
 
 
 def span(_ctx: click.Context, _param: click.Parameter, given: str) -> int:
@@ -63,12 +70,15 @@ def refuse_shared_files(outputs: Mapping[str, str | Path | None], inputs: Iterab
     """Refuse an output that is an input or another output, before one destroys the other.
 
     ``outputs``: by option. A device or a pipe holds nothing that could be lost: it may be shared.
+    Standard output is no file here: what is printed goes there.
     """
     taken = [(Path(one), "which is read") for one in inputs]
     for option, place in outputs.items():
         if place is None:
             continue
         path = Path(place)
+        if str(place) == STANDARD:
+            raise click.UsageError(f"{option}: expected a file, got -, where its results are told")
         if path.exists() and not path.is_file():
             continue
         for other, why in taken:
@@ -96,9 +106,21 @@ def refuse_missing_directories(outputs: Mapping[str, str | Path | None]) -> None
 
 
 @contextmanager
+def fresh_or_standard(path: Path) -> Iterator[BinaryIO]:
+    """A :func:`fresh_file`, or standard output for ``-``."""
+    if str(path) != STANDARD:
+        with fresh_file(path) as file:
+            yield file
+        return
+    sys.stdout.flush()
+    yield sys.stdout.buffer
+    sys.stdout.buffer.flush()
+
+
+@contextmanager
 def fresh_text(path: Path) -> Iterator[TextIO]:
-    """A :func:`fresh_file` for text, whose line ends are left as they are."""
-    with fresh_file(path) as file:
+    """A :func:`fresh_or_standard` for text, whose line ends are left as they are."""
+    with fresh_or_standard(path) as file:
         text = TextIOWrapper(file, encoding="utf-8", newline="")
         try:
             yield text

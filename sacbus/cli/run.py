@@ -15,6 +15,7 @@ import click
 
 from sacbus.cli.options import read_parameters, verbose
 from sacbus.cli.recordings import (
+    STANDARD,
     fresh_text,
     picture_form,
     refuse_missing_directories,
@@ -31,9 +32,6 @@ __all__ = ["run_command"]
 
 #: Seconds until a scenario counts as slow, and between two words about how far it is.
 SLOW: Final = 1.0
-
-#: The name of standard input among scenarios, and of standard output for JUnit XML.
-STANDARD: Final = "-"
 
 
 @click.command("run")
@@ -117,6 +115,8 @@ def run_command(
 
     if real and link is not None:
         raise click.UsageError("expected --real or --link, got both")
+    if as_json and junit is not None and junit.name == STANDARD:
+        raise click.UsageError("--json: expected --junit to be a file, got standard output")
     pages = {"--record": record, "--vcd": vcd, "--pcap": pcap, "--plot": picture}
     kept = [option for option, path in pages.items() if path is not None]
     if kept and link is not None:

@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from sacbus.cli.options import read_addresses, read_endpoints, read_settings, verbose
+from sacbus.cli.recordings import refuse_shared_files
 
 if TYPE_CHECKING:
     from sacbus.daemon import Configuration
@@ -145,6 +146,7 @@ def serve_command(
     from sacbus.selector import real_loop
     from sacbus.serve import serve
 
+    refuse_shared_files({"--record": record}, [] if config is None else [config])
     if config is None:
         buses: tuple[Configuration, ...] = (_one_bus(**given),)
     else:
