@@ -2,8 +2,7 @@
 
 Owns what counts as a difference. Compared are what was said on each bus, and each node's states and
 positions; not compared is what decides on none of these: reports, marks, collisions by themselves.
-Sequences are walked side by side. Where they part, one that lacks an entry is told from one that
-has another in its place, and the walk goes on.
+Sequences are walked side by side (``alignment.py``).
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from sacbus.kernel import Ns
+from sacbus.trace.alignment import NOTHING, Entry, walk
 from sacbus.trace.packets import Packet, packets
 from sacbus.trace.reading import Recording
 from sacbus.trace.track import Track
@@ -23,12 +23,6 @@ __all__ = ["Difference", "differences"]
 
 #: Bus time that positions are compared for at once.
 SPELL: Final[Ns] = 10_000_000_000
-
-#: Entries that one sequence may have more than the other and still be followed.
-FAR: Final = 16
-
-#: What stands where one of the two has nothing.
-NOTHING: Final = "nothing"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,14 +42,6 @@ class Difference:
         return (
             f"{seconds} s, {self.bus}{who}: {self.what}: expected {self.expected}, got {self.got}"
         )
-
-
-@dataclass(frozen=True, slots=True)
-class _Entry:
-    """Something in a sequence: when, and what must be equal, in words."""
-
-    when: Ns
-    words: str
 
 
 def differences(
@@ -101,7 +87,7 @@ def _of_alike(
             [_entry(one) for one in packets(bus, each) if one.sent.bus == bus.number]
             for each in (expected, got)
         ]
-        for when, one, other in _walk(said[0], said[1], within):
+        for when, one, other in walk(said[0], said[1], within):
             yield Difference(when, bus.name, None, "packet", one, other)
     over = min(expected.end, got.end)
     for node in expected.nodes:
@@ -112,9 +98,9 @@ def _of_alike(
                 yield Difference(when, name, node.address, "motion", one, other)
             continue
         states = [
-            [_Entry(when, state) for when, state in track.states(0, over + 1)] for track in tracks
+            [Entry(when, state) for when, state in track.states(0, over + 1)] for track in tracks
         ]
-        for when, one, other in _walk(states[0], states[1], within):
+        for when, one, other in walk(states[0], states[1], within):
             yield Difference(when, name, node.address, "state", one, other)
         apart = _parting(tracks[0], tracks[1], over, within, steps)
         if apart is not None:
@@ -133,55 +119,14 @@ def _began(expected: Track, got: Track) -> Iterator[tuple[Ns, str, str]]:
         yield told.segments[0].since, words[0], words[1]
 
 
-def _entry(packet: Packet) -> _Entry:
+def _entry(packet: Packet) -> Entry:
     said = packet.said
     sender = f"{packet.sent.sender}" if said.source is None else f"{said.source}"
     to = "" if said.destination is None else f">{said.destination}"
     check = f", check {said.verdict}" if said.verdict not in ("", "right") else ""
     data = f" {said.data.hex()}" if said.kind == "garbage" else ""
     body = said.data.decode("latin-1") if said.kind == "packet" else said.words
-    return _Entry(packet.start, f"{sender}{to} {body!r}{data}{check}")
-
-
-def _walk(
-    expected: Sequence[_Entry], got: Sequence[_Entry], within: Ns
-) -> Iterator[tuple[Ns, str, str]]:
-    """Where two sequences differ: when, and what stands there in each."""
-    i = j = 0
-    while i < len(expected) or j < len(got):
-        one = expected[i] if i < len(expected) else None
-        other = got[j] if j < len(got) else None
-        if one is None or other is None:
-            left = one or other
-            assert left is not None
-            yield left.when, one.words if one else NOTHING, other.words if other else NOTHING
-            i, j = i + 1, j + 1
-        elif one.words == other.words:
-            if abs(one.when - other.when) > within:
-                yield one.when, one.words, f"{other.words} {other.when - one.when:+} ns off"
-            i, j = i + 1, j + 1
-        else:
-            missing, extra = _ahead(other, expected, i, within), _ahead(one, got, j, within)
-            if missing and extra == missing:
-                # Either would do: whichever has more to come has more altogether.
-                missing = len(expected) - i >= len(got) - j
-            if missing and not 0 < extra < missing:
-                yield one.when, one.words, NOTHING
-                i += 1
-            elif extra:
-                yield other.when, NOTHING, other.words
-                j += 1
-            else:
-                yield one.when, one.words, other.words
-                i, j = i + 1, j + 1
-
-
-def _ahead(entry: _Entry, among: Sequence[_Entry], place: int, within: Ns) -> int:
-    """How far behind a place of the other sequence stands what an entry says; 0: not near it."""
-    for far, other in enumerate(among[place + 1 : place + 1 + FAR], start=1):
-        if other.words == entry.words and abs(other.when - entry.when) <= within:
-            return far
-    return 0
+    return Entry(packet.start, f"{sender}{to} {body!r}{data}{check}")
 
 
 def _parting(expected: Track, got: Track, over: Ns, within: Ns, steps: float) -> Ns | None:

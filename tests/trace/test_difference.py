@@ -57,6 +57,41 @@ def test_a_packet_that_is_missing_is_told_once() -> None:
     assert len(back) == 2
 
 
+def test_a_line_more_in_the_middle_is_told_and_not_all_that_it_delays() -> None:
+    lines = [f"v{rpm}" for rpm in range(50, 80)]
+    fewer, more = of(*lines), of(*lines[:15], "l3", *lines[15:])
+    packets = [one for one in differences(fewer, more) if one.what == "packet"]
+    extra, late, answer = packets
+    assert (extra.expected, extra.got) == ("nothing", "1>10 'l3'")
+    assert (answer.expected, answer.got) == ("nothing", "10>1 'ACK'")
+    assert (late.expected, late.got.partition(" +")[0]) == ("1>10 'v65'", "1>10 'v65'")
+
+
+def test_a_motion_more_is_told_by_its_states_and_not_all_that_follow() -> None:
+    async def play(mother: Mother, *, more: bool) -> None:
+        for number in range(8):
+            await mother.send(10, "m100v120")
+            await asyncio.sleep(3)
+            if more and number == 3:
+                await mother.send(10, "m-50v120")
+                await asyncio.sleep(0.004)
+            await asyncio.sleep(2)
+
+    async def fewer(_bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+        await play(mother, more=False)
+
+    async def longer(_bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+        await play(mother, more=True)
+
+    nodes = Configuration(nodes=(10, 11))
+    found = differences(recorded(fewer, nodes), recorded(longer, nodes), within=1 * US)
+    states = [(one.expected, one.got.split()[0]) for one in found if one.what == "state"]
+    assert [got for expected, got in states if expected == "nothing"] == [
+        *("STOP", "ACCEL", "DECEL", "STANDBY"),
+    ]
+    assert len(states) == 4 + 1
+
+
 @pytest.mark.parametrize(("within", "same"), [(0, False), (900 * US, False), (1_100 * US, True)])
 def test_time_may_differ_by_the_tolerance(within: int, same: bool) -> None:
     assert (not differences(of("m400"), of("m400", after=0.101), within=within)) is same
