@@ -88,6 +88,16 @@ def test_two_that_jitter_are_late_and_not_missing() -> None:
     assert all(NOTHING not in pair for _, *pair in told(expected, got))
 
 
+@pytest.mark.parametrize("shift", [0, 7])
+def test_very_much_more_is_followed_after_a_while(shift: int) -> None:
+    before, after = entries("abcd"), [Entry(one * MS, f"{one}") for one in range(400, 900)]
+    more = [Entry(300 * MS + one, f"more {one}") for one in range(50)]
+    later = [Entry(one.when + shift * MS, one.words) for one in after]
+    found = told(before + after, before + more + later)
+    assert len(found) < 2 * 16 + 50 + 2
+    assert {other for _, one, other in found if one == NOTHING} & {one.words for one in more}
+
+
 sequences = st.lists(st.sampled_from("abc"), max_size=40).map("".join)
 
 
@@ -96,14 +106,15 @@ def test_what_is_the_same_has_no_difference(text: str) -> None:
     assert told(entries(text), entries(text)) == []
 
 
-@given(sequences, sequences)
-def test_every_entry_is_paired_or_told(one: str, other: str) -> None:
-    expected, got = entries(one), entries(other)
+@given(sequences, sequences, st.integers(0, 3))
+def test_every_entry_is_paired_or_told(one: str, other: str, late: int) -> None:
+    expected, got = entries(one), entries(other, every=100 + late)
     found = told(expected, got)
     missing = sum(words != NOTHING and got_words == NOTHING for _, words, got_words in found)
     extra = sum(words == NOTHING for _, words, _ in found)
     assert len(expected) - missing == len(got) - extra
-    assert bool(found) is (one != other)
+    assert bool(found) is (one != other or (late > 0 and len(one) > 1))
+    assert all(words != got_words for _, words, got_words in found)
 
 
 @given(
