@@ -135,9 +135,7 @@ def export_command(
         raise click.UsageError(
             "nothing to write: give --vcd, --csv, --positions, --pcap or --plot a file"
         )
-    standard = [
-        option for option, path in outputs.items() if path is not None and _is_standard(path)
-    ]
+    standard = [option for option, path in outputs.items() if _is_standard(path)]
     if len(standard) > 1:
         raise click.UsageError(
             f"expected one on standard output, got {' and '.join(standard)}, give others a file"
@@ -158,7 +156,11 @@ def export_command(
     )
     form = None if picture is None else picture_form(picture)
     read = opened(recording)
-    told: list[tuple[Path, str]] = []
+
+    def tell(path: Path, what: str) -> None:
+        if not _is_standard(path):
+            click.echo(f"{path}: {what}", err=bool(standard))
+
     jobs: list[tuple[Path | None, str, Callable[[TextIO], int]]] = [
         (vcd, "changes of level", lambda out: write_vcd(read, out)),
         (events, "events", lambda out: write_events(read, out)),
@@ -167,16 +169,15 @@ def export_command(
     for path, what, write in jobs:
         if path is not None:
             with fresh_text(path) as out:
-                told.append((path, f"{write(out)} {what}"))
+                written = write(out)
+            tell(path, f"{written} {what}")
     if pcap is not None:
         with fresh_or_standard(pcap) as file:
-            told.append((pcap, f"{write_pcapng(read, file)} packets"))
+            written = write_pcapng(read, file)
+        tell(pcap, f"{written} packets")
     if picture is not None and form is not None:
         _draw(read, picture, form, nodes, xy)
-        told.append((picture, "drawn"))
-    for path, what in told:
-        if not _is_standard(path):
-            click.echo(f"{path}: {what}", err=bool(standard))
+        tell(picture, "drawn")
     note_cut_off(read)
     return 0
 

@@ -261,6 +261,7 @@ def test_packets_and_silence_can_be_expected(bus: VirtualBus) -> None:
         ({"node": 99, "position": 1}, "expect: expected nodes of bus 'bus' (10-12), got 99"),
         ({"node": 10, "position": 1, "posture": 1}, "expect.posture: unknown key"),
         ({"node": 10, "position": 1, "within": 3}, "expect.within: expected a time such as"),
+        ({"node": 10, "state": "RUNNING"}, "expect.state: expected a state of node 10 (STANDBY"),
         ({"node": 10}, "expected something to look at"),
         ({}, "expected something to look at"),
     ],
