@@ -3,6 +3,7 @@
 #   make serve ARGS="--nodes 10-19"            hosts a bus behind $(PTY)
 #   make serve CONFIG=examples/workshop.toml   hosts what a configuration says
 #   make test ARGS="tests/wire -k crc"         runs the tests
+#   make test ARGS=--pdb JOBS=0                runs them in one process, for a debugger
 #
 # The virtual environment is made on the first use and brought up to date when pyproject.toml
 # changes. PYTHON=/path/to/python3 names another interpreter.
@@ -14,6 +15,7 @@ PYTHON ?=
 PTY ?= /tmp/sacbus
 CONFIG ?=
 ARGS ?=
+JOBS ?= auto
 # --use-pep517: crcmod is an sdist, and an old pip without wheel builds it in a way it warns about.
 INSTALL := $(BIN)/python -m pip install -qq --disable-pip-version-check --use-pep517
 
@@ -36,8 +38,10 @@ serve: $(VENV)/run
 	@exec $(BIN)/python -c 'from sacbus.__main__ import main; main(interrupted=0)' \
 	  serve $(if $(CONFIG),'$(CONFIG)',$(if $(PTY),--pty '$(PTY)')) $(ARGS)
 
+# Many tests wait for a process of their own, and leave a core idle meanwhile: as many at a time as
+# there are cores.
 test: $(VENV)/dev
-	@$(BIN)/python -m pytest $(ARGS)
+	@$(BIN)/python -m pytest --numprocesses $(JOBS) --maxprocesses 8 --dist worksteal $(ARGS)
 
 coverage: $(VENV)/dev
 	@$(BIN)/python -m pytest --cov --cov-report= $(ARGS)

@@ -16,7 +16,7 @@ from tests.serving import Sacbus
 
 ROOT = Path(__file__).parents[1]
 #: What a `make test` hands down to us, and what it was given.
-MAKES_OWN = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS", "MAKEOVERRIDES", "ARGS", "PTY", "CONFIG"}
+MAKES_OWN = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS", "MAKEOVERRIDES", "ARGS", "JOBS", "PTY", "CONFIG"}
 
 
 @contextmanager

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import re
 import sys
-import time
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Final
 
 import click
 
+from sacbus.cli.machine_operator import Operator, ask, check_somebody_there, go_on
 from sacbus.cli.mothers_line import check_spoken
 from sacbus.cli.options import USAGE_STATUS, WrongInput, baud, verbose
 from sacbus.cli.part_program import STANDARD, PartProgram
@@ -29,13 +27,10 @@ from sacbus.fresh import fresh_file
 
 if TYPE_CHECKING:
     from sacbus.gcode import Checked
-    from sacbus.machining import Course, Machined, Told
+    from sacbus.machining import Course, Machined
     from sacbus.toolpath import Axis, Machine
 
 __all__ = ["gcode_command"]
-
-#: Seconds from one word about how far it is to the next.
-OFTEN: Final = 0.2
 
 _AXIS: Final = re.compile(r"([A-Za-z])=(\d{1,3}):(\d{1,9}(?:\.\d{1,9})?)")
 
@@ -184,20 +179,20 @@ def gcode_command(
             return USAGE_STATUS
         write = None if output is None else stack.enter_context(_listing(output, program.name))
         course = Course(program.items(machine), machine, write=write)
-        with _Progress(program.name, checked.lines) as progress, _too_far_told(program.name):
+        with Operator(program.name, checked.lines) as operator, _too_far_told(program.name):
             if plan_only:
-                machined = plan(course, baud=baud, progress=progress.come_to)
+                machined = plan(course, baud=baud, progress=operator.come_to)
             elif link is not None:
                 if checked.waits:
-                    os.close(_terminal())  # before anything moves
-                machined = run_on_link(course, progress.told(_ask), link, baud=baud)
+                    check_somebody_there()  # before anything moves
+                machined = run_on_link(course, operator.told(ask), link, baud=baud)
             else:
                 sink = None
                 if record is not None:
                     sink = stack.enter_context(Path(record).open("wb", buffering=0))
                 machined = rehearse(
                     course,
-                    progress.told(_go_on),
+                    operator.told(go_on),
                     baud=baud,
                     watch=picture is not None,
                     record=sink,
@@ -266,107 +261,9 @@ def _too_far_told(name: str) -> Iterator[None]:
         raise WrongInput(f"{name}, {fault}") from fault
 
 
-async def _go_on(say: Callable[[str], object], text: str, waits: bool) -> None:
-    """In a simulation nobody is waited for."""
-    say(f"{text}, would wait" if waits else text)
-
-
-async def _ask(say: Callable[[str], object], text: str, waits: bool) -> None:
-    say(f"{text}, press Enter to go on" if waits else text)
-    if waits:
-        await _key()
-
-
-def _terminal() -> int:
-    """A descriptor of the terminal, whatever standard input is."""
-    try:
-        return os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY)
-    except OSError as fault:
-        raise WrongInput(
-            "M0 waits for somebody, and there is no terminal, run it at one"
-        ) from fault
-
-
-async def _key() -> None:
-    """Wait until somebody at the terminal presses Enter."""
-    terminal = _terminal()
-    loop = asyncio.get_running_loop()
-    pressed = loop.create_future()
-
-    def read() -> None:
-        if pressed.done():
-            return
-        try:
-            if os.read(terminal, 1024):  # Ctrl-D is no Enter
-                pressed.set_result(None)
-        except OSError as fault:
-            gone = WrongInput("M0 waits for somebody, and the terminal is gone, run it at one")
-            gone.__cause__ = fault
-            pressed.set_exception(gone)
-
-    loop.add_reader(terminal, read)
-    try:
-        await pressed
-    finally:
-        loop.remove_reader(terminal)
-        os.close(terminal)
-
-
 def _arrived(course: Course, machined: Machined) -> bool:
     """Whether all axes are where the plan has them, as far as anybody can tell."""
     if machined.reached is None:
         return True
     planned = [course.survey.steps.get(index, 0) for index in range(len(machined.reached))]
     return list(machined.reached) == planned
-
-
-class _Progress:
-    """How far a program is, on a terminal's last line; gone when it is over."""
-
-    def __init__(self, name: str, lines: int) -> None:
-        self._name = name
-        self._lines = max(lines, 1)
-        self._next = time.monotonic() + 1
-        self._shown = False
-        self._terminal = sys.stderr.isatty()
-        self._line = 0
-
-    def come_to(self, line: int) -> None:
-        """It has come to this line of the program."""
-        self._line = line or self._line
-        if self._terminal and time.monotonic() >= self._next:
-            self._next = time.monotonic() + OFTEN
-            self._shown = True
-            part = min(self._line / self._lines, 1)
-            bar = "#" * round(30 * part)
-            click.echo(
-                f"\r\x1b[K{self._name} [{bar:<30}] {100 * part:.0f} %, line {self._line}",
-                nl=False,
-                err=True,
-            )
-
-    def told(self, halt: Callable[[Callable[[str], object], str, bool], Awaitable[None]]) -> Told:
-        """Who is told what on the way."""
-        from sacbus.machining import Told
-
-        return Told(
-            self.come_to,
-            partial(halt, self.say),
-            lambda streamed: self.say(f"stopped: {streamed.where()}"),
-        )
-
-    def say(self, text: str) -> None:
-        """What the program tells somebody."""
-        self._wipe()
-        click.echo(f"{self._name}: {text}", err=True)
-
-    def _wipe(self) -> None:
-        if self._shown:
-            click.echo("\r\x1b[K", nl=False, err=True)
-            self._shown = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._wipe()

@@ -81,7 +81,13 @@ def test_no_setting_of_a_sac_is_called_like_a_key_of_a_node() -> None:
 
 
 @pytest.mark.parametrize(
-    "key", [key for keys in TABLES.values() for key in keys if key.default is not None], ids=repr
+    "key",
+    [
+        pytest.param(key, id=f"{heading}: {key.name}")
+        for heading, keys in TABLES.items()
+        for key in keys
+        if key.default is not None
+    ],
 )
 def test_every_default_fits_and_reads_back_from_toml(key: Key) -> None:
     assert key.fits(key.default)
