@@ -275,8 +275,8 @@ def test_ctrl_c_stops_the_node_and_says_in_which_row(tmp_path: Path) -> None:
             assert told == (
                 f"node 10 was stopped with S at {file} line {row + 1}, row {row} of 200"
             )
-            # A row is 8 steps. However busy the machine is, neither the node nor what is reckoned of
-            # it is further than the queue has been written.
+            # A row is 8 steps. However busy the machine is, neither the node nor what is reckoned
+            # of it is further than the queue has been written.
             assert abs(stood / 8 - row) <= 30
             assert interrupted == "interrupted"
             assert command.returncode == 130
