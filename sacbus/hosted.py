@@ -269,17 +269,21 @@ class HostedBus:
         self._ports.append(port)
         return port
 
-    def mother(self) -> Mother:
-        """Mother on this very bus, at no distance from the line.
-
-        BadRequest where another protocol than hers is spoken: her bytes mean something else there.
-        """
+    def check_mother(self) -> None:
+        """BadRequest where mother does not speak: another protocol is on this line."""
         spoken = self.bus.protocol.name
         if spoken != SPEAKS:
             raise BadRequest(
                 f"bus {self.bus.name}: mother speaks {SPEAKS}, expected a bus that does, got "
                 f"{spoken}, take a master of that protocol"
             )
+
+    def mother(self) -> Mother:
+        """Mother on this very bus, at no distance from the line.
+
+        BadRequest where another protocol than hers is spoken: her bytes mean something else there.
+        """
+        self.check_mother()
 
         def hear(data: bytes) -> None:
             mother.hear(data)

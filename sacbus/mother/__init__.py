@@ -32,6 +32,7 @@ from sacbus.mother.queue_file import (
 )
 from sacbus.mother.release import Release, Share, stand_down, start_together
 from sacbus.mother.request import safe_body
+from sacbus.mother.sac_master import SacMaster
 from sacbus.mother.scan import ScanProgress
 from sacbus.mother.soft_ops import SoftOpHeard
 from sacbus.mother.statistics import NodeStatistics
@@ -67,6 +68,7 @@ __all__ = [
     "Refused",
     "Release",
     "RowRefused",
+    "SacMaster",
     "ScanProgress",
     "Sent",
     "Share",

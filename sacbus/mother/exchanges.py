@@ -15,7 +15,7 @@ Source: spec, superstepper; SS-MST67 manual, "Data Return".
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
@@ -24,6 +24,7 @@ from typing import Protocol as Contract
 from sacbus.kernel import MS, LineRate, Ns
 from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, LineLost, MotherError
+from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire.superstepper import (
     ANSWER_SIZE,
     Answer,
@@ -37,6 +38,8 @@ from sacbus.wire.superstepper import (
 
 __all__ = [
     "SLACK",
+    "SPEAKS",
+    "Answered",
     "BadChecksum",
     "Exchanges",
     "Nak",
@@ -44,6 +47,9 @@ __all__ = [
     "SuperStepperError",
     "Talk",
 ]
+
+#: The protocols of these messages, as buses call them: without ninth bits, and with.
+SPEAKS: Final = ("superstepper", "superstepper-9")
 
 #: How late an answer may be beyond the line's own figures, on a line in this process; it covers the
 #: turnaround, of which nothing is published.
@@ -93,7 +99,16 @@ class Talk(Contract):
     def __call__(self, data: bytes, ninth: bytes) -> object: ...
 
 
-Done = Callable[[Answer | MotherError], None]
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """A module has a message: its answer, and the round trip, in ns, of the last attempt."""
+
+    answer: Answer
+    attempts: int
+    round_trip: Ns
+
+
+Done = Callable[[Answered | MotherError], None]
 
 
 @dataclass(slots=True)
@@ -104,6 +119,7 @@ class _Request:
     done: Done
     may_repeat: bool
     attempts: int = 0
+    sent_at: Ns = 0
     withdrawn: bool = False
 
 
@@ -137,6 +153,8 @@ class Exchanges:
         self._attempt = 0
         self._pausing = False
         self._lost: LineLost | None = None
+        #: By address. What came damaged counts as a time-out: the answer was waited for in vain.
+        self.statistics: defaultdict[int, NodeStatistics] = defaultdict(NodeStatistics)
         #: Bytes that came when nothing was asked.
         self.strays = 0
 
@@ -187,7 +205,11 @@ class Exchanges:
         else:
             self._outstanding = None
             self.strays += len(self._heard) - ANSWER_SIZE
-            request.done(answer)
+            round_trip = self._clock.now - request.sent_at
+            statistics = self.statistics[request.address]
+            statistics.acks += 1
+            statistics.round_trips.append(round_trip)
+            request.done(Answered(answer, request.attempts, round_trip))
             self._next()
 
     def lose(self, why: str) -> None:
@@ -206,6 +228,11 @@ class Exchanges:
 
     def _send(self, request: _Request) -> None:
         request.attempts += 1
+        request.sent_at = self._clock.now
+        statistics = self.statistics[request.address]
+        statistics.sent += 1
+        if request.attempts > 1:
+            statistics.retries += 1
         self._outstanding = request
         self._heard.clear()
         self._attempt += 1
@@ -232,6 +259,10 @@ class Exchanges:
         self, request: _Request, kind: type[SuperStepperError], *, may_repeat: bool = False
     ) -> None:
         self._outstanding = None
+        if kind is Nak:
+            self.statistics[request.address].naks += 1
+        else:
+            self.statistics[request.address].timeouts += 1
         may_repeat = (may_repeat or request.may_repeat) and not request.withdrawn
         if may_repeat and request.attempts < TRIES:
             self._waiting.appendleft(request)

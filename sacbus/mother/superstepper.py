@@ -18,6 +18,8 @@ from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, MotherError
 from sacbus.mother.exchanges import (
     SLACK,
+    SPEAKS,
+    Answered,
     BadChecksum,
     Exchanges,
     Nak,
@@ -69,8 +71,21 @@ class _Host(Contract):
     def arrive(self, callback: Callable[..., object], *arguments: object) -> None: ...
 
 
+class _Protocol(Contract):
+    """What is spoken on a line."""
+
+    @property
+    def name(self) -> str: ...
+
+
 class _Line(Contract):
     """What a bus has of a line."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def protocol(self) -> _Protocol: ...
 
     @property
     def rate(self) -> LineRate: ...
@@ -149,7 +164,16 @@ class SuperStepper:
 
     @classmethod
     def on(cls, bus: Hosted) -> SuperStepper:
-        """The master on a bus in this process, at no distance from its line; closed with it."""
+        """The master on a bus in this process, at no distance from its line; closed with it.
+
+        BadRequest where another protocol is spoken: these bytes mean something else there.
+        """
+        spoken = bus.bus.protocol.name
+        if spoken not in SPEAKS:
+            raise BadRequest(
+                f"bus {bus.bus.name}: this master speaks {' or '.join(SPEAKS)}, expected a bus "
+                f"that does, got {spoken}, take a master of that protocol"
+            )
         masters: list[SuperStepper] = []
 
         def hear(data: bytes) -> None:
@@ -257,9 +281,9 @@ class SuperStepper:
         self, address: int, message: Message, *, accept_duplicates: bool = False
     ) -> Answer:
         """Any message; its answer."""
-        future: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
+        future: asyncio.Future[Answered] = asyncio.get_running_loop().create_future()
 
-        def done(outcome: Answer | MotherError) -> None:
+        def done(outcome: Answered | MotherError) -> None:
             if future.done():
                 return  # the caller was cancelled while the message was on its way
             if isinstance(outcome, MotherError):
@@ -276,7 +300,7 @@ class SuperStepper:
 
         self._arrive(ask)
         try:
-            return await future
+            return (await future).answer
         finally:
             if future.cancelled():
                 self.exchanges.withdraw(done)

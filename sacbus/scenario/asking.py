@@ -1,39 +1,23 @@
-"""What mother is asked for in a scenario, once or again and again, and what came of it in words.
+"""What a master is asked for in a scenario again and again.
 
-Owns the way from a line to mother's transactions. Synchronous; an exchange costs an appointment or
-two and no task of a loop.
+Owns the pace of polling. Synchronous; an exchange costs an appointment or two and no task of a
+loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
 from sacbus.kernel import Ns
-from sacbus.mother import (
-    Acknowledged,
-    MotherError,
-    NoAnswer,
-    Refused,
-    Sent,
-    UnknownOutcome,
-    addressed_line,
-)
+from sacbus.mother.masters import Came
 from sacbus.scenario.bench import Bench
 from sacbus.scenario.values import Outcome, Poll
 
-__all__ = ["Polling", "ask", "outcome_of", "told"]
+__all__ = ["Polling", "outcome_of"]
 
 #: Failures of one polling step that are told one by one; of the rest only how many there were.
 TOLD: Final = 3
-
-_OUTCOMES: Final[Mapping[type, Outcome]] = {
-    Acknowledged: "ack",
-    Sent: "ack",
-    Refused: "nak",
-    NoAnswer: "no answer",
-    UnknownOutcome: "unknown",
-}
 
 
 class Polling:
@@ -47,7 +31,6 @@ class Polling:
         self._bench = bench
         self._poll = poll
         self._failed = failed
-        self._requests = [(*addressed_line(line), line) for line in poll.lines]
         self._next = 0
         self._due: Ns = 0
         self._failures = 0
@@ -67,49 +50,22 @@ class Polling:
     def _ask(self) -> None:
         if self._stopped or not self._goes_on():
             return
-        node, command, _ = self._requests[self._next]
         self._due += self._poll.every
-        caller = self._bench.caller
-        body = command.encode("latin-1")
-        if node == 0:
-            caller.broadcast(body, self._done)
-        else:
-            caller.call(node, body, self._done)
+        self._bench.master.ask(self._poll.lines[self._next], self._done)
 
-    def _done(self, outcome: Acknowledged | Sent | MotherError) -> None:
+    def _done(self, came: Came) -> None:
         wanted = self._poll.outcome
-        if wanted not in ("any", outcome_of(outcome)):
+        if wanted not in ("any", outcome_of(came)):
             self._failures += 1
             if self._failures <= TOLD:
-                line = self._requests[self._next][2]
+                line = self._poll.lines[self._next]
                 more = ", and is not told of again" if self._failures == TOLD else ""
-                self._failed(f"poll {line!r} to end in {wanted}", f"{told(outcome)}{more}")
-        self._next = (self._next + 1) % len(self._requests)
+                self._failed(f"poll {line!r} to end in {wanted}", f"{came}{more}")
+        self._next = (self._next + 1) % len(self._poll.lines)
         clock = self._bench.clock
         clock.at(max(self._due, clock.now), self._ask)
 
 
-def ask(
-    bench: Bench,
-    line: str,
-    done: Callable[[Acknowledged | Sent | MotherError], None],
-    *,
-    accept_duplicates: bool,
-) -> None:
-    node, command = addressed_line(line)
-    body = command.encode("latin-1")
-    if node == 0:
-        bench.caller.broadcast(body, done)
-    else:
-        bench.caller.call(node, body, done, accept_duplicates=accept_duplicates)
-
-
-def outcome_of(outcome: Acknowledged | Sent | MotherError) -> Outcome:
-    return _OUTCOMES.get(type(outcome), "lost")
-
-
-def told(outcome: Acknowledged | Sent | MotherError) -> str:
-    """An outcome in words."""
-    if isinstance(outcome, MotherError):
-        return f"{outcome_of(outcome)} ({outcome})"
-    return outcome_of(outcome)
+def outcome_of(came: Came) -> Outcome:
+    """In the words of a scenario: what nobody answers has come to all that it can."""
+    return "ack" if came.outcome == "sent" else came.outcome

@@ -1,4 +1,4 @@
-"""One bus of a scenario as it is played on: mother, the line, and what can be done to its nodes.
+"""One bus of a scenario as it is played on: its master, the line, what can be done to its nodes.
 
 Owns the difference between a bus that is hosted here, whether in virtual or real time, and one at
 the far end of a link, of which only the line can be seen.
@@ -15,7 +15,8 @@ from sacbus.bus.transmission import Transmission
 from sacbus.hosted import HostedBus
 from sacbus.kernel import MS, LineRate, Ns
 from sacbus.links import Line as Link
-from sacbus.mother import Caller, Clock
+from sacbus.mother import Clock
+from sacbus.mother.masters import Master, find_master
 from sacbus.node import Heard, Protocol, Report, ReportKind
 from sacbus.panel import Panel
 from sacbus.scenario.line import Line, Passed
@@ -58,7 +59,8 @@ class Bench:
         self.say = say
         self.unsent = unsent
         self.span = span
-        self.caller: Caller
+        #: Who speaks to the nodes; None where no master of their protocol is installed.
+        self.speaker: Master | None = None
         self.hosted: HostedBus | None = None
         self.look: Ns = LOOK
         #: By the addresses of the configuration, whatever a node is called by now.
@@ -74,6 +76,22 @@ class Bench:
         self.tape: Tape | None = None
         self._collided_before = 0
 
+    @property
+    def master(self) -> Master:
+        """Who speaks to the nodes."""
+        assert self.speaker is not None, "the rules have looked for a master"
+        return self.speaker
+
+    def hear(self, data: bytes) -> None:
+        """The master hears what nodes say."""
+        if self.speaker is not None:
+            self.speaker.hear(data)
+
+    def lose(self, why: str) -> None:
+        """The master's line is gone."""
+        if self.speaker is not None:
+            self.speaker.lose(why)
+
     def begin(self, origin: Ns) -> None:
         """The scenario begins now, which is its time 0."""
         self.origin = origin
@@ -86,7 +104,7 @@ class Bench:
 
     def counts(self, nodes: tuple[int, ...] | None = None) -> dict[str, int]:
         """What has been counted of these nodes, or of all, since the beginning."""
-        table = self.caller.statistics
+        table = {} if self.speaker is None else self.speaker.statistics
         chosen = [one for address, one in table.items() if nodes is None or address in nodes]
         if nodes is None:
             warnings = self.warnings.total()
@@ -126,26 +144,27 @@ class Bench:
 
 
 def hosted_bench(hosted: HostedBus) -> Bench:
-    """A bus in this process, with mother at no distance from its line."""
+    """A bus in this process, with its master at no distance from its line."""
     kernel, bus = hosted.host.kernel, hosted.bus
 
     def hear(heard: Heard, _now: Ns) -> None:
-        bench.caller.hear(heard.data)
+        bench.hear(heard.data)
 
     port = Port(bus.medium, hear, latency=0, name="mother")
 
     def say(data: bytes, ninth: bytes | None) -> None:
-        port.talk(data, bytes(len(data)) if ninth is None else ninth)
+        port.talk(data, 0 if ninth is None else ninth)
 
     protocol, span = bus.protocol, bus.rate.span
     bench = Bench(bus.name, kernel, protocol, port.talk, lambda: port.unsent, span, say)
-    bench.caller = Caller(kernel, port.talk, rate=bus.rate, unsent=lambda: port.unsent)
+    if (kind := find_master(protocol.name)) is not None:
+        bench.speaker = kind.create(kernel, say, bus.rate, unsent=lambda: port.unsent)
     _watch(bench, hosted)
     return bench
 
 
 def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
-    """A bus in this process, with mother at the far end of one of its links, in real time."""
+    """A bus in this process, with its master at the far end of one of its links, in real time."""
     kernel, bus = hosted.host.kernel, hosted.bus
     # The link's end is a pty, which has no ninth bits: bytes with some get on the line beside it.
     beside = Port(bus.medium, _deaf, latency=0, name="mother")
@@ -157,11 +176,12 @@ def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
             hosted.host.arrive(beside.talk, data, ninth)
 
     bench = Bench(bus.name, kernel, bus.protocol, link.send, lambda: 0, bus.rate.span, say)
-    bench.caller = Caller(kernel, link.send, rate=bus.rate, slack=slack)
+    if (kind := find_master(bus.protocol.name)) is not None:
+        bench.speaker = kind.create(kernel, say, bus.rate, slack=slack)
     _watch(bench, hosted)
     link.start(
-        lambda data: hosted.host.arrive(bench.caller.hear, data),
-        lambda why: hosted.host.arrive(bench.caller.lose, why),
+        lambda data: hosted.host.arrive(bench.hear, data),
+        lambda why: hosted.host.arrive(bench.lose, why),
     )
     return bench
 
@@ -173,21 +193,30 @@ def far_bench(
 
     def send(data: bytes) -> None:
         link.send(data)
+        said(data, None)
+
+    def said(data: bytes, ninth: bytes | None) -> None:
         now = clock.now
-        bench.line.note(Passed(now, now + rate.span(len(data)), 0, "mother", data))
+        end = now + rate.span(len(data))
+        bench.line.note(Passed(now, end, 0, "mother", data, ninth=ninth))
 
     def hear(data: bytes) -> None:
         now = clock.now
         begun = max(now - rate.span(len(data)), 0)
         bench.line.note(Passed(begun, now, protocol.lanes - 1, "line", data))
-        bench.caller.hear(data)
+        bench.hear(data)
 
-    def say(data: bytes, _ninth: bytes | None) -> None:
-        send(data)
+    def say(data: bytes, ninth: bytes | None) -> None:
+        if ninth is None:
+            send(data)
+        else:
+            link.send_marked(data, ninth)
+            said(data, ninth)
 
     bench = Bench(name, clock, protocol, send, lambda: 0, rate.span, say)
-    bench.caller = Caller(clock, send, rate=rate, slack=slack)
-    link.start(hear, bench.caller.lose)
+    if (kind := find_master(protocol.name)) is not None:
+        bench.speaker = kind.create(clock, say, rate, slack=slack)
+    link.start(hear, bench.lose)
     return bench
 
 

@@ -191,7 +191,12 @@ STEP: Final = (
 
 #: What a step does: exactly one of these, or none with ``wait``.
 DEEDS: Final = (
-    Key("send", 'a line such as "10m400", or several', _is_lines, "mother sends it, with retries"),
+    Key(
+        "send",
+        'a line such as "10m400" or "3 stop", or several',
+        _is_lines,
+        "the bus's master sends it, with retries",
+    ),
     Key(
         "raw",
         "bytes in hexadecimal, ^ before each whose ninth bit is 1",

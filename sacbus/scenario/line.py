@@ -75,4 +75,5 @@ def _said(said: Said) -> str:
     where = "all" if said.general else "master" if said.destination == MASTER else said.destination
     if said.kind == "packet":
         return f"to {where} {said.body!r}, {said.words}{verdict}"
-    return f"{said.kind.upper()} to {where}{verdict}"
+    # An answer may bring something: what was read, or what its sender has seen of the line.
+    return f"{said.words} to {where}{verdict}"

@@ -14,13 +14,8 @@ from functools import partial
 
 from sacbus.bus import FaultOn
 from sacbus.kernel import SECOND, Ns
-from sacbus.mother import (
-    Acknowledged,
-    MotherError,
-    Sent,
-    addressed_line,
-)
-from sacbus.scenario.asking import Polling, ask, outcome_of, told
+from sacbus.mother.masters import Came
+from sacbus.scenario.asking import Polling, outcome_of
 from sacbus.scenario.bench import Bench
 from sacbus.scenario.expectations import Counted, Shown
 from sacbus.scenario.judges import judge
@@ -263,37 +258,33 @@ class Play:
     def _bench(self, name: str) -> Bench:
         return self._benches[name] if name else self._first
 
-    # ---- mother ----
+    # ---- the master ----
 
     def _send(self, index: int, send: Send, number: int) -> None:
         bench = self._bench(send.bus)
         line = send.lines[number]
 
-        def done(outcome: Acknowledged | Sent | MotherError) -> None:
+        def done(came: Came) -> None:
             if self.over:
                 return
-            got = outcome_of(outcome)
-            self._record(bench, line, outcome, got)
-            if send.outcome not in ("any", got):
-                self._settle(index, f"{line!r} to end in {send.outcome}", told(outcome))
+            self._record(bench, came)
+            if send.outcome not in ("any", outcome_of(came)):
+                self._settle(index, f"{line!r} to end in {send.outcome}", str(came))
             elif number + 1 < len(send.lines):
                 self._send(index, send, number + 1)
             else:
                 self._settle(index)
 
-        ask(bench, line, done, accept_duplicates=send.accept_duplicates)
+        bench.master.ask(line, done, accept_duplicates=send.accept_duplicates)
 
-    def _record(
-        self, bench: Bench, line: str, outcome: Acknowledged | Sent | MotherError, told: str
-    ) -> None:
+    def _record(self, bench: Bench, came: Came) -> None:
         if bench.tape is None:
             return
-        node, command = addressed_line(line)
         bench.tape.recorder.outcome(
-            node,
-            command.encode("latin-1"),
-            "sent" if isinstance(outcome, Sent) else told,
-            getattr(outcome, "attempts", 1),
+            came.line.node,
+            came.line.command.encode("latin-1"),
+            came.outcome,
+            came.attempts,
             bus=bench.tape.number(bench.name),
         )
 

@@ -18,8 +18,8 @@ from sacbus.config.mistake import ConfigError, Mistake
 from sacbus.config.notation import ranges
 from sacbus.configuration import Configuration, check
 from sacbus.kernel import LineRate
-from sacbus.mother import BadRequest, addressed_line, safe_body
-from sacbus.mother.request import SPEAKS, checked_address
+from sacbus.mother import BadRequest
+from sacbus.mother.masters import MasterKind, find_master
 from sacbus.node import Node, PinError, find_kind, settings_from
 from sacbus.scenario.expectations import (
     Counted,
@@ -50,8 +50,8 @@ from sacbus.scenario.values import (
 
 __all__ = ["Complaint", "complaints", "line_complaints", "refuse"]
 
-#: Counts that mother keeps, and so can be had over a link.
-_MOTHERS = ("retries", "naks", "acks", "timeouts")
+#: Counts that a master keeps, and so can be had over a link.
+_MASTERS = ("retries", "naks", "acks", "timeouts")
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +140,7 @@ def _beyond_a_line(deed: Deed | str | None) -> str | None:
         case Silent(source=source) if source is not None:
             return "the silence of one node among others"
         case Counted(counts=counts):
-            others = [name for name in counts if name not in _MOTHERS]
+            others = [name for name in counts if name not in _MASTERS]
             return f"a count of {others[0]}" if others else None
         case _:
             return None
@@ -157,6 +157,7 @@ class _Rules:
         self._circular = _circular(self._before)
         self._aside: dict[tuple[str, int], Node] = {}
         self._kind = cache(find_kind)
+        self._master = cache(find_master)
 
     def of(self, index: int, step: Step) -> Iterator[_Found]:
         yield from self._times(index, step)
@@ -202,11 +203,13 @@ class _Rules:
             case Send(lines=lines, outcome=outcome) | Poll(lines=lines, outcome=outcome):
                 if not lines:
                     yield "send", "expected one line at least, got none", "give one"
-                if (spoken := check(bus).name) != SPEAKS:
-                    what = f"expected a bus that speaks {SPEAKS} as mother does, got {spoken}"
-                    yield "send", what, "give bytes, as raw"
+                spoken = check(bus).name
+                if (master := self._master(spoken)) is None:
+                    what = f"expected a bus whose protocol has a master here, got {spoken}"
+                    yield "send", what, "install one, or give bytes, as raw"
+                    return
                 for line in lines:
-                    yield from self._line(bus, line, outcome)
+                    yield from self._line(bus, master, line, outcome)
                 if isinstance(deed, Poll) and deed.every <= 0:
                     yield "every", "expected a time of more than 0, got 0 s", "correct it"
             case Raw(data=data):
@@ -260,19 +263,16 @@ class _Rules:
             what = f"expected the name of a step with a fault, got {name!r}"
             yield "lift", what, f"correct it; {words}"
 
-    def _line(self, bus: Configuration, line: str, outcome: str) -> Iterator[_Found]:
+    def _line(
+        self, bus: Configuration, master: MasterKind, line: str, outcome: str
+    ) -> Iterator[_Found]:
         try:
-            node, command = addressed_line(line)
-            if node:
-                checked_address(node)
-            safe_body(command.encode("latin-1"))
+            to = master.read(line)
         except BadRequest as wrong:
             yield "send", str(wrong), "correct it"
-        except UnicodeEncodeError:
-            yield "send", f"line {line!r}: expected characters of one byte", "correct it"
         else:
-            if node and outcome == "ack":
-                yield from self._nodes(bus, (node,), "send")
+            if not to.everybody and outcome == "ack":
+                yield from self._nodes(bus, (to.node,), "send")
 
     def _nodes(self, bus: Configuration, nodes: Iterable[int], key: str) -> Iterator[_Found]:
         nodes = tuple(nodes)

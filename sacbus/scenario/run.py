@@ -13,6 +13,7 @@ from contextlib import AsyncExitStack, contextmanager, suppress
 from io import BytesIO
 from typing import Any, BinaryIO, Final
 
+from sacbus.bus import PLAIN_BITS
 from sacbus.configuration import Configuration, check
 from sacbus.daemon import open_bus
 from sacbus.host import Standstill, run_virtual
@@ -27,7 +28,7 @@ from sacbus.scenario.play import Play
 from sacbus.scenario.result import Result
 from sacbus.scenario.rules import refuse
 from sacbus.scenario.tape import Tape
-from sacbus.scenario.values import Scenario
+from sacbus.scenario.values import Poll, Scenario, Send
 from sacbus.trace import RecordingCutOff
 
 __all__ = ["run", "run_on_link", "run_real"]
@@ -143,6 +144,10 @@ async def _far(scenario: Scenario, link: str, progress: Progress | None) -> Resu
     rate = LineRate(bus.baud or protocol.rate.baud, protocol.rate.bits)
     loop = asyncio.get_running_loop()
     async with open_line(link, rate.baud) as line:
+        if rate.bits > PLAIN_BITS and any(
+            isinstance(one.does, Send | Poll) for one in scenario.steps
+        ):
+            line.check_marking()
         clock = LoopClock(loop)
         bench = far_bench(bus.name, clock, protocol, line, rate, LINK_SLACK)
         play = Play(scenario, {bus.name: bench})

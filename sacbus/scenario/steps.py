@@ -16,8 +16,9 @@ from sacbus.config.keys import Key, shown
 from sacbus.config.mistake import Findings
 from sacbus.config.source import Source
 from sacbus.config.table import Table, tables
-from sacbus.configuration import Configuration
+from sacbus.configuration import Configuration, check
 from sacbus.language.queue_file import WrongRow
+from sacbus.mother.request import SPEAKS
 from sacbus.scenario.edits import queue_edits
 from sacbus.scenario.expecting import ExpectationReader, time_of
 from sacbus.scenario.keys import (
@@ -71,6 +72,7 @@ class StepReader:
     def __init__(self, source: Source, findings: Findings, buses: Sequence[Configuration]) -> None:
         self._source = source
         self._findings = findings
+        self._buses = buses
         self._expected = ExpectationReader(findings, buses)
         self._count = 0
         #: The bus of steps that name none: that of the group that they are in.
@@ -263,6 +265,11 @@ class StepReader:
     def _queue(self, table: Table, bus: str) -> Deed | None:
         inner = self._inner(table, "queue", QUEUE)
         if not _has(inner, "node", "file"):
+            return None
+        there = next((one for one in self._buses if not bus or one.name == bus), None)
+        if there is not None and (spoken := check(there).name) != SPEAKS:
+            what = f"expected a bus that speaks {SPEAKS}, as queue files do, got {spoken}"
+            self._findings.add(table.at("queue"), what, "leave it out")
             return None
         nodes = (0,) if inner.get("node") == 0 else self._expected.nodes(inner.get("node"), bus)
         file = self._source.directory / os.path.expanduser(inner.get("file"))  # noqa: PTH111

@@ -50,10 +50,11 @@ Outcome = str
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Mother sends lines one after the other, each with its retries: ``10m400``, ``0y``.
+    """The bus's master sends lines one after the other, with retries: ``10m400``, ``3 stop``.
 
-    Over when the last one's outcome is known. ``outcome``: what each must come to; ``any`` for no
-    matter what. ``accept_duplicates``: repeat after silence even what may then run twice.
+    Lines are in that master's words. Over when the last one's outcome is known. ``outcome``: what
+    each must come to; ``any`` for no matter what. ``accept_duplicates``: repeat after silence even
+    what may then run twice.
     """
 
     lines: tuple[str, ...]
@@ -64,7 +65,7 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Poll:
-    """Mother sends the lines in turn, one each ``every``, for ``lasting``, or to the end.
+    """The bus's master sends the lines in turn, one each ``every``, for ``lasting``, or to the end.
 
     A line whose time comes before the one before it is settled follows when that is.
     """

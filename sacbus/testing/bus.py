@@ -19,7 +19,7 @@ from sacbus.bus.fault import FaultOn
 from sacbus.host import VirtualLoop
 from sacbus.hosted import HostedBus
 from sacbus.kernel import SECOND, Kernel, Ns
-from sacbus.mother import Acknowledged, Mother, MotherError, Sent
+from sacbus.mother import Acknowledged, Mother, MotherError, SacMaster, Sent
 from sacbus.node import Report
 from sacbus.scenario.bench import Bench, hosted_bench
 from sacbus.scenario.expectations import Expectation
@@ -81,7 +81,8 @@ class VirtualBus:
             unsent=bench.unsent,
             arrive=self._ask,
         )
-        bench.caller = self.mother.caller
+        if isinstance(bench.speaker, SacMaster):
+            bench.speaker = SacMaster(self.mother.caller)
         #: All nodes by their configured addresses.
         self.nodes: Mapping[int, VirtualNode] = {
             address: VirtualNode(self, address, panel) for address, panel in bench.panels.items()
@@ -204,7 +205,10 @@ class VirtualBus:
         self._settle(one, came[0])
 
     def send(self, node: int, line: str, *, accept_duplicates: bool = False) -> Acknowledged:
-        """Send a line to a node as mother and wait for its answer; errors as of ``Mother.send``."""
+        """Send a line to a node as mother and wait for its answer; errors as of ``Mother.send``.
+
+        BadRequest on a bus of another protocol than hers.
+        """
         outcome = self._outcome(
             lambda done: self.mother.caller.call(
                 node, line.encode("latin-1"), done, accept_duplicates=accept_duplicates
@@ -281,6 +285,7 @@ class VirtualBus:
         self, ask: Callable[[Callable[[Acknowledged | Sent | MotherError], None]], None]
     ) -> Acknowledged | Sent:
         __tracebackhide__ = True
+        self.hosted.check_mother()
         self._kernel_alone("await mother.send(...) or mother.broadcast(...)")
         came: list[Acknowledged | Sent | MotherError] = []
         ask(came.append)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from sacbus.kernel import MS
+from sacbus.kernel import MS, US
 from sacbus.mother import BadRequest, LineLost, MotherError
-from sacbus.mother.exchanges import Exchanges
+from sacbus.mother.exchanges import Answered, Exchanges
 from sacbus.mother.superstepper import BadChecksum, Nak, NoReply, SuperStepperError
 from sacbus.wire.superstepper import (
     Answer,
@@ -20,9 +20,11 @@ from sacbus.wire.superstepper import (
 )
 from tests.nodes.superstepper.bench import Bench
 
-Outcome = Answer | MotherError
+Outcome = Answered | MotherError
 
 MOVE = MoveSteps(True, 10_000, 10)
+
+COUNTED = ("sent", "acks", "naks", "timeouts", "retries")
 
 
 class Rig:
@@ -53,13 +55,13 @@ class Rig:
             case _:
                 self.bench.port.talk(data, ninth)
 
-    def ask(self, address: int, message: Message, **how: bool) -> Outcome:
+    def ask(self, address: int, message: Message, **how: bool) -> Answer | MotherError:
         outcomes: list[Outcome] = []
         self.exchanges.call(address, message, outcomes.append, **how)
         while not outcomes:
             assert self.bench.kernel.run_next()
         (outcome,) = outcomes
-        return outcome
+        return outcome.answer if isinstance(outcome, Answered) else outcome
 
 
 @pytest.mark.parametrize("nine", [False, True], ids=["8-bit", "9-bit"])
@@ -77,7 +79,24 @@ def test_messages_go_out_one_after_the_other() -> None:
         rig.exchanges.call(address, Read(2), outcomes.append)
     assert len(rig.sent) == 1
     rig.bench.run(100 * MS)
-    assert outcomes == [Answer(3, value=10), Answer(4, value=10), Answer(3, value=10)]
+    # Three bytes, 100 us, and five bytes, at 9600 baud.
+    trip = rig.bench.span(3) + 100 * US + rig.bench.span(5)
+    wanted = [Answered(Answer(who, value=10), 1, trip) for who in (3, 4, 3)]
+    assert outcomes == wanted
+
+
+def test_what_comes_of_messages_is_counted_by_module() -> None:
+    rig = Rig()
+    rig.weather = ["lost", "cut", "fine", "spoilt", "fine"]
+    rig.ask(3, Read(2))
+    rig.ask(4, Read(2))
+    counts = rig.exchanges.statistics
+    assert [counts[3].as_dict()[name] for name in COUNTED] == [3, 1, 1, 1, 2]
+    assert [counts[4].as_dict()[name] for name in COUNTED] == [2, 1, 0, 1, 1]
+    rig.weather = ["cut"] * 3
+    rig.ask(3, MOVE)
+    assert [counts[3].as_dict()[name] for name in COUNTED] == [6, 1, 4, 1, 4]
+    assert len(counts[4].round_trips) == 1
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ from sacbus.scenario.rules import refuse
 from sacbus.scenario.values import Deed
 
 BUS = Configuration(nodes=(10, 11))
+MODULES = Configuration(nodes=(30,), kind="ss-mst67")
 
 
 def refusals(*steps: Step | Deed, line_only: bool = False) -> list[str]:
@@ -134,11 +135,39 @@ def test_a_circle_is_told_of_those_in_it_and_of_nobody_who_waits_for_them() -> N
     assert [line.split(":")[0] for line in told] == [f"steps[{index}].after" for index in (0, 1, 3)]
 
 
-def test_lines_are_for_a_bus_that_speaks_as_mother_does() -> None:
-    bus = Configuration(nodes=(3,), kind="ss-mst67")
-    refuse(Scenario("x", (bus,), (Step(Raw(b"\x1c\x03", ninth=b"\x01\x00")), Step(NodeIs((3,))))))
-    with pytest.raises(ConfigError, match="expected a bus that speaks sac as mother does, got sup"):
-        refuse(Scenario("x", (bus,), (Step(Send(("3m400",), "any")),)))
+def told_of(line: str) -> list[str]:
+    """What is against a line to modules, of which there is one at 30."""
+    with pytest.raises(ConfigError) as wrong:
+        refuse(Scenario("x", (MODULES,), (Step(Send((line,))),)))
+    return [str(one) for one in wrong.value.mistakes]
+
+
+def test_lines_are_in_the_words_of_the_buss_own_master() -> None:
+    for line, kind in (("30 stop", "ss-mst67"), ("30S", "sac")):
+        refuse(Scenario("x", (Configuration(nodes=(30,), kind=kind),), (Step(Send((line,))),)))
+    (told,) = told_of("30S")
+    assert told == (
+        "steps[0].send: line '30S': expected an address from 0 to 31 and a command, as in 3 stop, "
+        "got '30S', 'x', correct it"
+    )
+
+
+def test_a_module_that_is_not_there_is_missed_unless_another_outcome_is_expected() -> None:
+    assert told_of("0 stop") == [
+        "steps[0].send: expected nodes of bus 'bus' (30), got 0, 'x', correct it"
+    ]
+    refuse(Scenario("x", (MODULES,), (Step(Send(("0 stop",), "no answer")),)))
+
+
+def test_a_protocol_without_a_master_takes_bytes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sacbus.mother.masters.GROUP", "sacbus.nobodys")
+    (told,) = told_of("30 stop")
+    assert told == (
+        "steps[0].send: expected a bus whose protocol has a master here, got superstepper, 'x', "
+        "install one, or give bytes, as raw"
+    )
+    steps = (Step(Raw(b"\xf4\x03")), Step(Counted({"acks": Bounds.exactly(0)})))
+    assert run(Scenario("x", (MODULES,), steps)).passed
 
 
 def test_ninth_bits_take_more_than_a_link() -> None:

@@ -1,0 +1,125 @@
+"""The master of a protocol, for who speaks as one without knowing which: lines in words.
+
+Owns this contract, what becomes of a line in terms that are every protocol's, and how masters are
+found: entry points of the group ``sacbus.masters`` by the names of their protocols, the project's
+own no differently from a third party's. Synchronous; knows no protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Final, NamedTuple
+from typing import Protocol as Contract
+
+from sacbus.kernel import LineRate, Ns
+from sacbus.mother.clock import Clock
+from sacbus.mother.errors import BadRequest
+from sacbus.mother.statistics import NodeStatistics
+
+__all__ = ["GROUP", "Addressed", "Came", "Master", "MasterKind", "Speak", "find_master"]
+
+GROUP: Final = "sacbus.masters"
+
+
+class Addressed(NamedTuple):
+    """A line taken apart: for ``node``, or for ``everybody``, who do not answer; and its command.
+
+    Of what is for everybody ``node`` is what the protocol calls that, as a recording has it.
+    """
+
+    node: int
+    command: str
+    everybody: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Came:
+    """What became of a line.
+
+    ``outcome``: ``ack``; ``sent`` for what nobody answers; ``nak``; ``no answer``; ``unknown`` for
+    what may have been executed, or not; ``lost`` with the line. ``attempts``: how often it went.
+    ``words``: what an answer brought, or what went wrong, for people; empty for a mere ACK.
+    """
+
+    line: Addressed
+    outcome: str
+    attempts: int = 1
+    words: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.outcome} ({self.words})" if self.words else self.outcome
+
+
+#: Puts bytes on a line; with a 0 or 1 for each as its ninth bit where that says something.
+Speak = Callable[[bytes, bytes | None], object]
+
+
+class Master(Contract):
+    """A master on one line, one request at a time, by the rules of its protocol."""
+
+    @property
+    def statistics(self) -> Mapping[int, NodeStatistics]:
+        """What has been counted of each node."""
+        ...
+
+    def ask(
+        self, line: str, done: Callable[[Came], object], *, accept_duplicates: bool = False
+    ) -> None:
+        """Have a line executed; ``done`` is called once, with what became of it.
+
+        ``accept_duplicates``: after silence send again even what may then run twice. BadRequest at
+        once for what :meth:`MasterKind.read` refuses.
+        """
+        ...
+
+    def hear(self, data: bytes) -> None:
+        """Bytes of the nodes have arrived."""
+        ...
+
+    def lose(self, why: str) -> None:
+        """The line is gone: everything that waits is lost, and so is all that is asked later."""
+        ...
+
+
+class MasterKind(Contract):
+    """The masters of a protocol, as an entry point of the group ``sacbus.masters`` gives them."""
+
+    def read(self, line: str) -> Addressed:
+        """Whom a line is for; BadRequest, naming what is expected, for one that cannot be sent."""
+        ...
+
+    def create(
+        self,
+        clock: Clock,
+        speak: Speak,
+        rate: LineRate,
+        *,
+        slack: Ns | None = None,
+        unsent: Callable[[], int] | None = None,
+    ) -> Master:
+        """A master on a line.
+
+        ``slack``: how much later than the line's own figures an answer may come; None: as on a line
+        in this process. ``unsent``, where it can be known: how many bytes still wait for the line.
+        """
+        ...
+
+
+def find_master(protocol: str) -> MasterKind | None:
+    """The master of a protocol; None when none is installed.
+
+    BadRequest, naming it, for one that cannot be loaded.
+    """
+    for entry in entry_points(group=GROUP):
+        if entry.name == protocol:
+            try:
+                kind: MasterKind = entry.load()
+            except Exception as fault:  # a third party's import may fail in any way
+                raise BadRequest(
+                    f"the master of {protocol!r} ({entry.value}) cannot be loaded: {fault!r}; "
+                    "mend or uninstall its package"
+                ) from fault
+            return kind
+    return None

@@ -1,0 +1,101 @@
+"""The master of a Super Stepper Bus as the master of a protocol: lines as ``sacbus ss`` has them.
+
+Owns what becomes of them in the terms of ``masters.py``; the transactions are ``exchanges.py``'s,
+the words ``superstepper_words.py``'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from sacbus.kernel import LineRate, Ns
+from sacbus.mother.clock import Clock
+from sacbus.mother.errors import MotherError
+from sacbus.mother.exchanges import SLACK, Answered, BadChecksum, Exchanges, Nak, NoReply
+from sacbus.mother.masters import Addressed, Came, Speak
+from sacbus.mother.statistics import NodeStatistics
+from sacbus.mother.superstepper_words import Order, meaning, read_line
+
+__all__ = ["SUPER_STEPPER_MASTER", "SuperStepperMaster", "SuperStepperMasterKind"]
+
+#: Bits of a byte where there is a ninth one.
+_NINE: Final = 11
+
+_OUTCOMES: Final[Mapping[type, str]] = {
+    Nak: "nak",
+    NoReply: "no answer",
+    BadChecksum: "unknown",
+}
+
+
+class SuperStepperMaster:
+    """Messages in order, asked in lines."""
+
+    def __init__(self, exchanges: Exchanges) -> None:
+        self._exchanges = exchanges
+
+    @property
+    def statistics(self) -> Mapping[int, NodeStatistics]:
+        """What has been counted of each module."""
+        return self._exchanges.statistics
+
+    def ask(
+        self, line: str, done: Callable[[Came], object], *, accept_duplicates: bool = False
+    ) -> None:
+        """As :class:`~sacbus.mother.masters.Master` has it."""
+        order = read_line(line)
+
+        def came(outcome: Answered | MotherError) -> None:
+            done(_came(order, outcome))
+
+        self._exchanges.call(
+            order.address, order.message, came, accept_duplicates=accept_duplicates
+        )
+
+    def hear(self, data: bytes) -> None:
+        """Bytes from the modules."""
+        self._exchanges.hear(data)
+
+    def lose(self, why: str) -> None:
+        """The line is gone."""
+        self._exchanges.lose(why)
+
+
+class SuperStepperMasterKind:
+    """The entry points ``superstepper`` and ``superstepper-9`` of the group ``sacbus.masters``."""
+
+    def read(self, line: str) -> Addressed:
+        """An address and a command: ``3 stop``. There is no message for all modules."""
+        order = read_line(line)
+        return Addressed(order.address, order.text)
+
+    def create(
+        self,
+        clock: Clock,
+        speak: Speak,
+        rate: LineRate,
+        *,
+        slack: Ns | None = None,
+        unsent: Callable[[], int] | None = None,
+    ) -> SuperStepperMaster:
+        """A master on a line, in the mode that its bytes tell."""
+        nine = rate.bits == _NINE
+
+        def talk(data: bytes, ninth: bytes) -> None:
+            speak(data, ninth if nine else None)
+
+        late = SLACK if slack is None else slack
+        return SuperStepperMaster(Exchanges(clock, talk, rate, slack=late, unsent=unsent))
+
+
+def _came(order: Order, outcome: Answered | MotherError) -> Came:
+    to = Addressed(order.address, order.text)
+    if isinstance(outcome, Answered):
+        words = meaning(order.command, outcome.answer)
+        return Came(to, "ack", outcome.attempts, "" if words == "ACK" else words)
+    attempts = getattr(outcome, "attempts", 1)
+    return Came(to, _OUTCOMES.get(type(outcome), "lost"), attempts, str(outcome))
+
+
+SUPER_STEPPER_MASTER: Final = SuperStepperMasterKind()
