@@ -109,6 +109,10 @@ def test_what_differs_is_told_a_line_each_and_as_json(
         "got": "800",
         "expected": "801",
     }
+    # One position is one position.
+    file.write_text(text(rows[:1]))
+    assert run(["queue", "compare", terminal(sacbus, 12), str(file)]) == 0
+    assert capsys.readouterr() == (f"1 position is as in {file}\n", "")
 
 
 @pytest.mark.parametrize(

@@ -95,6 +95,16 @@ def test_on_a_terminal_scan_shows_how_far_it_is_and_leaves_nothing_of_it(bus: Sa
         os.close(terminal)
 
 
+@pytest.mark.slow
+def test_a_node_is_told_when_it_is_found_also_where_no_terminal_is(bus: Sacbus) -> None:
+    command = [sys.executable, "-m", "sacbus", "scan", bus.link, "--nodes", "10,90-250"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("node 10: ")
+        assert process.poll() is None  # 161 absent ones are asked, three times each
+        process.terminate()
+
+
 def test_estop_says_what_it_has_sent(capsys: Captured, bus: Sacbus) -> None:
     assert run(["estop", bus.link]) == 0
     written = capsys.readouterr()

@@ -67,6 +67,21 @@ def test_silence_is_told_with_its_own_status(link: str) -> None:
     assert error.startswith("error: module 9: 'read the byte at RAM 0x06' sent 3 times: no answer")
 
 
+@pytest.mark.parametrize("place", range(5))
+def test_options_stand_wherever_one_likes(link: str, place: int) -> None:
+    words = [link, "2", "read", "0x1f"]
+    for option in (["--json", "--baud", "9600"], ["--baud=9600", "-v", "--json"]):
+        status, said, error = ss(*words[:place], *option, *words[place:])
+        assert (status, error) == (0, "")
+        assert json.loads(said)["message"] == "read the byte at RAM 0x1f"
+
+
+def test_another_rate_behind_the_command_is_the_lines(link: str) -> None:
+    # On a pty of another rate modules hear nothing that they understand.
+    assert ss(link, "3", "status", "--baud", "2400")[0] in (3, 4, 5)
+    assert ss(link, "3", "stop")[0] == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "told"),
     [
@@ -74,8 +89,12 @@ def test_silence_is_told_with_its_own_status(link: str) -> None:
         (("3", "read", "256"), 2, "expected a number from 0 to 255, got '256'"),
         (("3", "read", "x"), 2, "expected a number from 0 to 255, got 'x'"),
         (("3", "read", "0", "--word", "--eeprom"), 2, "leave --word or --eeprom out"),
-        (("3", "microsteps", "3"), 2, "'3' is not one of"),
+        (("3", "microsteps", "3"), 2, "expected 1, 2, 4 or 8, got '3'"),
         (("3", "move-steps", "5"), 2, "Missing option '--speed'"),
+        (("3", "status", "--baud"), 2, "Option '--baud' requires an argument"),
+        (("3", "status", "--baud", "fast"), 2, "Invalid value for '--baud': 'fast'"),
+        (("3", "stop", "--jsn"), 2, "No such option '--jsn'"),
+        (("--speed", "5", "3", "stop"), 2, "No such option '--speed'"),
     ],
 )
 def test_mistakes_are_told_in_one_line(

@@ -10,7 +10,7 @@ import click
 
 from sacbus.cli.options import NO_ANSWER_STATUS, baud, help_unless_asked, verbose
 from sacbus.cli.queue_put import put_command
-from sacbus.cli.rows import STANDARD, opened_rows
+from sacbus.cli.rows import STANDARD, opened_rows, positions
 
 __all__ = ["queue_group"]
 
@@ -76,7 +76,8 @@ def get_command(terminal: str, file: str, baud: int, as_json: bool) -> int:
         }
         click.echo(json.dumps(report))
     else:
-        click.echo(f"{len(screen.rows)} positions written to {file}; Q is at {screen.next_free}")
+        written = positions(len(screen.rows))
+        click.echo(f"{written} written to {file}; Q is at {screen.next_free}")
     return 0
 
 
@@ -126,5 +127,5 @@ def compare_command(terminal: str, file: str, sprf: int, baud: int, as_json: boo
     elif found:
         click.echo("\n".join(map(str, found)))
     else:
-        click.echo(f"{count} positions are as in {file}")
+        click.echo(f"{positions(count)} {'is' if count == 1 else 'are'} as in {file}")
     return 1 if found else 0

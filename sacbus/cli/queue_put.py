@@ -18,7 +18,7 @@ from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
 from sacbus.cli.mothers_line import mothers_line
 from sacbus.cli.options import WrongInput, baud, verbose
 from sacbus.cli.outcomes import failures, told
-from sacbus.cli.rows import Rows, opened_rows, shown_progress
+from sacbus.cli.rows import Rows, opened_rows, positions, shown_progress
 
 if TYPE_CHECKING:
     from sacbus.language import Defaults
@@ -186,9 +186,9 @@ def _tell_where(wanted: _Wanted, row: int, how: str) -> None:
 
 def _words(node: int, report: dict[str, object]) -> str:
     rows = report["rows"]
+    assert isinstance(rows, int), "a count"
     if not report["streamed"]:
         saved = ", and saved to its EEPROM" if report["saved"] else ""
-        what = "position" if rows == 1 else "positions"
-        return f"{rows} {what} written to node {node}{saved}"
+        return f"{positions(rows)} written to node {node}{saved}"
     what = "row" if rows == 1 else "rows"
     return f"node {node} has run {rows} {what}, {report['seconds']:.3f} s"

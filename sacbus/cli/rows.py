@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sacbus.language.queue_file import QueueRow, ReadRow
     from sacbus.plan.entries import Spool
 
-__all__ = ["STANDARD", "Rows", "opened_rows", "shown_progress"]
+__all__ = ["STANDARD", "Rows", "opened_rows", "positions", "shown_progress"]
 
 STANDARD: Final = "-"
 """The name of standard input and output."""
@@ -64,6 +64,11 @@ class Rows:
             yield from read_rows(self._spool, self._spool.name, self._defaults)
         except (WrongRow, PlanError) as fault:
             raise WrongInput(str(fault)) from fault
+
+
+def positions(count: int) -> str:
+    """So many positions of a queue, in words."""
+    return f"{count} position" if count == 1 else f"{count} positions"
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from sacbus.wire.superstepper import Answer, Message
 
 __all__ = ["ss_group"]
+
+#: What stands before the words of a command.
+_PLACES: Final = ("LINK", "ADDRESS", "COMMAND")
 
 
 class _Typed(click.ParamType["int | str"]):
@@ -71,7 +74,9 @@ class _Messages(click.Group):
                 break
             option = options.get(word.partition("=")[0])
             if option is None:
-                others.append(word)
+                # Before its command one of the command's own is none: click says so.
+                early = word.startswith("-") and len(others) < len(_PLACES)
+                (own if early else others).append(word)
                 continue
             own.append(word)
             if not option.is_flag and "=" not in word:
@@ -123,24 +128,29 @@ def _made(command: Command) -> click.Command:
         return _exchange(line, command, message)
 
     operands = [click.Argument([word.key], type=_Typed(word)) for word in command.operands]
-    options = [
-        click.Option(
-            [word.name],
-            help=word.meaning,
-            is_flag=word.flag,
-            type=None if word.flag else _Typed(word),
-            metavar=f"[{'|'.join(word.choices)}]" if word.choices else None,
-            required=not word.flag and word.default is None,
-            default=False if word.flag else word.default,
-            show_default=word.default is not None,
-        )
-        for word in command.options
-    ]
+    options = [_option(word) for word in command.options]
     return click.Command(
         command.name,
         callback=click.pass_obj(said),
         params=[*operands, *options],
         help=command.summary,
+    )
+
+
+def _option(word: Word) -> click.Option:
+    if word.flag:
+        return click.Option([word.name], is_flag=True, help=word.meaning)
+    # A default of None would be one, and nothing required. ``Any``: the types that click has.
+    default: dict[str, Any] = (
+        {} if word.default is None else {"default": word.default, "show_default": True}
+    )
+    return click.Option(
+        [word.name],
+        type=_Typed(word),
+        metavar=f"[{'|'.join(word.choices)}]" if word.choices else None,
+        required=not default,
+        help=word.meaning,
+        **default,
     )
 
 

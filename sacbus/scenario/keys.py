@@ -232,6 +232,13 @@ SEND: Final = (
         default=False,
     ),
     Key(
+        "says",
+        "a text",
+        _is_name,
+        "what each answer must bring, as sacbus ss prints it",
+        otherwise="anything",
+    ),
+    Key(
         "every",
         TIME,
         _is_time,

@@ -270,6 +270,8 @@ class Play:
             self._record(bench, came)
             if send.outcome not in ("any", outcome_of(came)):
                 self._settle(index, f"{line!r} to end in {send.outcome}", str(came))
+            elif send.says is not None and came.words != send.says:
+                self._settle(index, f"{line!r} to be answered {send.says!r}", str(came))
             elif number + 1 < len(send.lines):
                 self._send(index, send, number + 1)
             else:

@@ -210,6 +210,8 @@ class _Rules:
                     return
                 for line in lines:
                     yield from self._line(bus, master, line, outcome)
+                if isinstance(deed, Send) and deed.says is not None and outcome != "ack":
+                    yield "says", f"expected only with outcome ack, got {outcome}", "remove it"
                 if isinstance(deed, Poll) and deed.every <= 0:
                     yield "every", "expected a time of more than 0, got 0 s", "correct it"
             case Raw(data=data):

@@ -250,7 +250,10 @@ class StepReader:
         if every is None:
             if "for" in table.values:
                 self._findings.add(table.at("for"), "expected only with every", "remove it")
-            return Send(lines_, outcome, table.get("accept_duplicates", False), bus)
+            again, says = table.get("accept_duplicates", False), table.get("says")
+            return Send(lines_, outcome, again, bus, says)
+        if "says" in table.values:
+            self._findings.add(table.at("says"), "expected only without every", "remove it")
         return Poll(lines_, every, time_of(table, "for"), outcome, bus)
 
     def _fault(self, table: Table, value: Mapping[str, object], bus: str) -> Deed | None:

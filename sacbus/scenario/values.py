@@ -54,13 +54,15 @@ class Send:
 
     Lines are in that master's words. Over when the last one's outcome is known. ``outcome``: what
     each must come to; ``any`` for no matter what. ``accept_duplicates``: repeat after silence even
-    what may then run twice.
+    what may then run twice. ``says``: what each answer must bring, in the words of that master:
+    ``at rest``, ``66 (0x42)``.
     """
 
     lines: tuple[str, ...]
     outcome: Outcome = "ack"
     accept_duplicates: bool = False
     bus: str = ""
+    says: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,9 @@
 """Steps in files: CSV for everybody, npy for numpy.
 
 Owns both forms. CSV has a line a step, ``time_ns,axis,direction``, with that as a first line or
-without; the axis is its number, the direction 1 or -1. npy has one array with fields of these
-names, or of whole numbers in three columns. In the order of time. An axis's number in a file is its
-name, not its place: nodes have addresses.
+without; blank lines count for nothing; the axis is its number, the direction 1 or -1. npy has one
+array with fields of these names, or of whole numbers in three columns. In the order of time. An
+axis's number in a file is its name, not its place: nodes have addresses.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ _STORED: Final = np.dtype([("time_ns", "<i8"), ("axis", "<i4"), ("direction", "i
 
 
 class _Columns(NamedTuple):
-    """Some lines of a file: three arrays of int64, and the number of the first, a line or a row."""
+    """Some steps of a file: arrays of int64; ``numbers`` are those of their lines or rows."""
 
     times: Times
     axes: Times
     directions: Times
-    first: int
+    numbers: Times
 
 
 def axes_in(path: Path) -> tuple[int, ...]:
@@ -132,30 +132,45 @@ def _of_array(path: Path) -> Iterator[_Columns]:
             if int(piece.max()) > _LARGEST:
                 raise SimadError(f"{path}: expected numbers below 2**63, got {piece.max()}")
         times, axes, ways = (piece.astype(np.int64) for piece in pieces)
-        yield _Columns(times, axes, ways, first)
+        yield _Columns(times, axes, ways, np.arange(first, first + len(times), dtype=np.int64))
 
 
 def _of_lines(path: Path, file: TextIO) -> Iterator[_Columns]:
-    number = 1
+    number, begun = 1, False
     while lines := list(islice(file, PIECE)):
-        skipped = int(number == 1 and lines[0].strip().split(",")[0].strip() == FIELDS[0])
-        rows = lines[skipped:]
-        try:
-            found = np.array([row.split(",") for row in rows]).astype(np.int64)
-        except (ValueError, OverflowError):
-            found = np.empty((0, 0), dtype=np.int64)
-        if rows and found.shape != (len(rows), len(FIELDS)):
-            found = _one_by_one(path, rows, number + skipped)
+        numbers = np.arange(number, number + len(lines), dtype=np.int64)
+        number += len(lines)
+        if not begun:
+            first = next((place for place, line in enumerate(lines) if line.strip()), len(lines))
+            begun = first < len(lines)
+            first += begun and lines[first].split(",")[0].strip() == FIELDS[0]
+            lines, numbers = lines[first:], numbers[first:]
+        found = _all_at_once(lines)
+        if found is None:
+            # Only now, for it costs as much as the reading: nearly no file has blank lines.
+            kept = [place for place, line in enumerate(lines) if line.strip()]
+            lines, numbers = [lines[place] for place in kept], numbers[kept]
+            found = _all_at_once(lines)
+        if found is None:
+            found = _one_by_one(path, lines, numbers.tolist())
         if len(found):
             times, axes, ways = found.T
-            yield _Columns(times, axes, ways, number + skipped)
-        number += len(lines)
+            yield _Columns(times, axes, ways, numbers)
 
 
-def _one_by_one(path: Path, rows: Sequence[str], number: int) -> Times:
+def _all_at_once(rows: Sequence[str]) -> Times | None:
+    """The three columns of lines; None where one of them is wrong, or blank."""
+    try:
+        found = np.array([row.split(",") for row in rows]).astype(np.int64)
+    except (ValueError, OverflowError):
+        return None
+    return found if found.shape == (len(rows), len(FIELDS)) or not rows else None
+
+
+def _one_by_one(path: Path, rows: Sequence[str], numbers: Sequence[int]) -> Times:
     """Lines of which one at least is wrong; SimadError names the first."""
     found = []
-    for line, row in enumerate(rows, start=number):
+    for line, row in zip(numbers, rows, strict=True):
         try:
             values = [int(word) for word in row.split(",")]
         except ValueError:
@@ -177,13 +192,13 @@ def _check(path: Path, columns: _Columns, now: int) -> None:
     if early.size:
         place = int(early[0])
         raise SimadError(
-            f"{path}, {what} {columns.first + place}: expected a time of {before[place]} ns or "
+            f"{path}, {what} {columns.numbers[place]}: expected a time of {before[place]} ns or "
             f"later, got {columns.times[place]}, sort the steps"
         )
     wrong = np.flatnonzero(np.abs(columns.directions) != 1)
     if wrong.size:
         place = int(wrong[0])
         raise SimadError(
-            f"{path}, {what} {columns.first + place}: expected a direction of 1 or -1, "
+            f"{path}, {what} {columns.numbers[place]}: expected a direction of 1 or -1, "
             f"got {columns.directions[place]}"
         )

@@ -60,6 +60,21 @@ def test_csv_needs_no_first_line_of_names_and_may_have_blanks(tmp_path: Path) ->
     assert (steps.times.tolist(), steps.directions.tolist()) == ([5, 6], [-1, 1])
 
 
+@pytest.mark.parametrize("piece", [1, 2, 3, 100])
+@pytest.mark.parametrize("text", ["\n \n{0}5,1,-1\n\n6,1,1\n\n", "{0}\n\n5,1,-1\n6,1,1\n \t\n\n\n"])
+@pytest.mark.parametrize("names", ["", "time_ns,axis,direction\n"])
+def test_blank_lines_count_for_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, piece: int, text: str, names: str
+) -> None:
+    monkeypatch.setattr(files, "PIECE", piece)
+    path = tmp_path / "steps.csv"
+    path.write_text(text.format(names))
+    steps = joined([*read_steps(path, (1,))])
+    assert (steps.times.tolist(), steps.directions.tolist()) == ([5, 6], [-1, 1])
+    path.write_text("\n\n" + names)
+    assert axes_in(path) == ()
+
+
 def test_an_array_of_three_columns_is_read_too(tmp_path: Path) -> None:
     path = tmp_path / "steps.npy"
     np.save(path, np.array([[5, 1, -1], [6, 1, 1]], dtype=np.int32))
@@ -72,8 +87,20 @@ def test_an_array_of_three_columns_is_read_too(tmp_path: Path) -> None:
     [
         ("5,1,1\n6,1\n", "line 2: expected time_ns,axis,direction as whole numbers, got '6,1'"),
         (
-            "time_ns,axis,direction\n5,1,1\n\n6,1,1\n",
-            "line 3: expected time_ns,axis,direction as whole numbers, got ''",
+            "time_ns,axis,direction\n5,1,1\n\n6,1,1\n \n6,1\n\n",
+            "line 6: expected time_ns,axis,direction as whole numbers, got '6,1'",
+        ),
+        (
+            "5,1,1\n\n\n4,1,1\n",
+            "line 4: expected a time of 5 ns or later, got 4, sort the steps",
+        ),
+        ("\n5,1,1\n\n6,1,3\n", "line 4: expected a direction of 1 or -1, got 3"),
+        (
+            "5,1,1\n\ntime_ns,axis,direction\n",
+            (
+                "line 3: expected time_ns,axis,direction as whole numbers, "
+                "got 'time_ns,axis,direction'"
+            ),
         ),
         ("5.5,1,1\n", "line 1: expected time_ns,axis,direction as whole numbers, got '5.5,1,1'"),
         (
