@@ -268,10 +268,14 @@ class Play:
             if self.over:
                 return
             self._record(bench, came)
+            wanted = ""
             if send.outcome not in ("any", outcome_of(came)):
-                self._settle(index, f"{line!r} to end in {send.outcome}", str(came))
+                wanted = f"{line!r} to end in {send.outcome}"
             elif send.says is not None and came.words != send.says:
-                self._settle(index, f"{line!r} to be answered {send.says!r}", str(came))
+                wanted = f"{line!r} to be answered {send.says!r}"
+            if wanted:
+                # A little later, when the answer is in the tail of the line too.
+                self._clock.at(self._clock.now, self._settle, index, wanted, str(came))
             elif number + 1 < len(send.lines):
                 self._send(index, send, number + 1)
             else:

@@ -79,6 +79,19 @@ def test_every_opcode_has_a_method(jmp2: str) -> None:
     virtually(session())
 
 
+def test_a_bus_of_another_protocol_is_refused() -> None:
+    async def session() -> None:
+        async with open_bus(Configuration(nodes=(10,), name="arm")) as bus:
+            with pytest.raises(BadRequest) as refused:
+                SuperStepper.on(bus)
+        assert str(refused.value) == (
+            "bus arm: this master speaks superstepper or superstepper-9, expected a bus that does, "
+            "got sac, take a master of that protocol"
+        )
+
+    virtually(session())
+
+
 def test_a_call_that_is_cancelled_leaves_the_line_to_others() -> None:
     async def session() -> None:
         async with hosted() as bus:

@@ -142,6 +142,14 @@ async def test_what_another_task_does_is_seen_at_once(bus: VirtualBus) -> None:
 # ---- looking and doing ----
 
 
+@pytest.mark.sacbus(kind="ss-mst67", nodes="3")
+def test_mother_sends_nothing_to_a_bus_of_another_protocol(bus: VirtualBus) -> None:
+    for send in (lambda: bus.send(3, "S"), lambda: bus.broadcast("S")):
+        with pytest.raises(BadRequest, match="mother speaks sac, expected a bus that does"):
+            send()
+    assert bus.told()[2] == "  nothing"
+
+
 def test_mother_sends_and_her_errors_are_those_of_her_coroutines(bus: VirtualBus) -> None:
     assert bus.send(10, "m40").attempts == 1
     assert bus.node(11).send("m-40").node == 11
