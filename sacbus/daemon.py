@@ -25,17 +25,23 @@ __all__ = ["FASTEST", "SLOWEST", "Configuration", "HostedBus", "NodeAt", "check"
 
 
 @asynccontextmanager
-async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[HostedBus]:
+async def open_bus(
+    configuration: Configuration | None = None, *, beside: HostedBus | None = None
+) -> AsyncIterator[HostedBus]:
     """Host a bus in the running loop, for an ``async with`` block.
 
     In a :class:`~sacbus.host.VirtualLoop` bus time is that loop's time; in any other it follows the
-    loop's clock, as precisely as that loop wakes. Raises KindError, SettingError, StateError or
-    LinkError, each a line that a user can act on, with nothing left open.
+    loop's clock, as precisely as that loop wakes. ``beside`` another bus, which must stay open for
+    as long, it has that one's time there, with its speed and pace. Raises KindError, SettingError,
+    StateError or LinkError, each a line that a user can act on, with nothing left open.
     """
     configuration = configuration or Configuration()
     protocol = check(configuration)
     loop = asyncio.get_running_loop()
-    kernel = loop.kernel if isinstance(loop, VirtualLoop) else Kernel()
+    if isinstance(loop, VirtualLoop):
+        kernel, beside = loop.kernel, None
+    else:
+        kernel = Kernel() if beside is None else beside.host.kernel
     rate = LineRate(configuration.baud or protocol.rate.baud, protocol.rate.bits)
     bus = Bus(
         kernel,
@@ -62,7 +68,10 @@ async def open_bus(configuration: Configuration | None = None) -> AsyncIterator[
                 if remark is not None:
                     bus.tell(Report(kernel.now, wanted.address, ReportKind.WARNING, remark))
             bus.add(kind.create(wanted.address, settings, rate, bus.tell, memory))
-        hosted = HostedBus(configuration, bus, _host(configuration, bus, loop))
+        if beside is None:
+            hosted = HostedBus(configuration, bus, _host(configuration, bus, loop))
+        else:
+            hosted = HostedBus(configuration, bus, beside.host, guest=True)
         stack.callback(hosted.close)
         for place in configuration.links:
             await _open_link(hosted, place)

@@ -45,7 +45,11 @@ class NoTerminal(KeyError):
 class HostedBus:
     """A bus that runs: its nodes can be looked at, driven by mother, and connected to."""
 
-    def __init__(self, configuration: Configuration, bus: Bus, host: Host) -> None:
+    def __init__(
+        self, configuration: Configuration, bus: Bus, host: Host, *, guest: bool = False
+    ) -> None:
+        """``guest``: the host is another bus's, and closed with that."""
+        self._guest = guest
         self.configuration = configuration
         self.bus = bus
         self.host = host
@@ -304,7 +308,8 @@ class HostedBus:
         if self._watchdog is not None:
             self._watchdog.end()
         with ExitStack() as stack:  # the rest is closed also when a link cannot be
-            stack.callback(self.host.close)
+            if not self._guest:
+                stack.callback(self.host.close)
             for mother in self._mothers:
                 stack.callback(mother.lose, "the bus is closed")
             for port in (*self._ports, *self._leaving):

@@ -105,7 +105,11 @@ async def _really(
     scenario: Scenario, speed: float, record: BinaryIO | None, progress: Progress | None
 ) -> Result:
     async with AsyncExitStack() as stack:
-        buses = [dataclasses.replace(bus, speed=speed) for bus in scenario.buses]
+        # Of several, one whose line is in use must not run ahead of another.
+        paced = len(scenario.buses) > 1
+        buses = [
+            dataclasses.replace(bus, speed=speed, pace=bus.pace or paced) for bus in scenario.buses
+        ]
         hosted = await _host(stack, buses)
         benches: dict[str, Bench] = {}
         for bus in hosted:
@@ -213,7 +217,11 @@ async def _until(
 
 
 async def _host(stack: AsyncExitStack, buses: list[Configuration]) -> list[HostedBus]:
-    hosted = [await stack.enter_async_context(open_bus(bus)) for bus in buses]
+    hosted: list[HostedBus] = []
+    for one in buses:
+        # One clock for all: a step on one of them may follow from what happens on another.
+        beside = hosted[0] if hosted else None
+        hosted.append(await stack.enter_async_context(open_bus(one, beside=beside)))
     for bus in hosted:
         await bus.booted()
     return hosted

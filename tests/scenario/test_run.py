@@ -10,7 +10,7 @@ import pytest
 from sacbus.kernel import SECOND
 from sacbus.links import LinkError
 from sacbus.scenario import Scenario, read, run, run_on_link, run_real
-from tests.scenario.stage import scenario
+from tests.scenario.stage import HEAD, scenario
 from tests.serving import served
 
 MOVE = """
@@ -90,6 +90,42 @@ def test_in_real_time_mother_is_a_program_at_a_pty(file: Path) -> None:
     result = run_real(scenario(file, MOVE), record=sink)
     assert result.failures == []
     assert b'"from":"link 1"' in sink.getvalue()
+
+
+@pytest.mark.slow
+def test_in_real_time_all_buses_have_one_clock(file: Path) -> None:
+    text = """
+        [[bus]]
+        name = "other"
+        pace = false
+        [[bus.nodes]]
+        addresses = "10"
+        [[step]]
+        bus = "other"
+        send = ["10V1", "10m20v300s"]
+        [[step]]
+        send = "10m20v300"
+        [[step]]
+        bus = "other"
+        expect = { node = 10, state = "SYNC" }
+        [[step]]
+        expect = { node = 10, position = 20, state = "STANDBY", within = "5 s" }
+        [[step]]
+        bus = "other"
+        send = ["0y", "99"]
+        outcome = "any"
+        [[step]]
+        bus = "other"
+        expect = { node = 10, position = 20, within = "5 s" }
+        [[step]]
+        bus = "other"
+        power = { node = 10, on = false }
+        [[step]]
+        bus = "other"
+        expect = { node = 10, state = "OFF" }
+        """
+    result = run_real(scenario(file, text, HEAD.replace("[[bus]]", "[[bus]]\nname = 'one'")))
+    assert [str(one) for one in result.failures] == []
 
 
 @pytest.mark.slow
