@@ -211,7 +211,7 @@ def test_what_became_of_lines_is_in_the_recording(tmp_path: Path) -> None:
 def test_wrong_words_are_named_before_anything_is_played(tmp_path: Path) -> None:
     text = """
         [[step]]
-        send = ["3 stop", "3 stopp", "3 home --speed fast"]
+        send = ["3 stop", "3 halt", "3 home --speed fast"]
         [[step]]
         send = "3 stop"
         says = "ACK"
@@ -225,8 +225,8 @@ def test_wrong_words_are_named_before_anything_is_played(tmp_path: Path) -> None
         """
     assert mistakes(tmp_path / "a.toml", HEAD + dedent(text)) == [
         (
-            f"step[0].send: line '3 stopp': expected a command ({', '.join(COMMANDS)}), "
-            "got 'stopp', line 7, correct it"
+            f"step[0].send: line '3 halt': expected a command ({', '.join(COMMANDS)}), "
+            "got 'halt', line 7, correct it"
         ),
         (
             "step[0].send: line '3 home --speed fast': --speed: expected a number from 0 to 65535, "
