@@ -6,6 +6,7 @@ Owns what becomes of them in the terms of ``masters.py``; the transactions are `
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import Final
 
 from sacbus.kernel import LineRate, Ns
@@ -20,6 +21,9 @@ from sacbus.mother.request import checked_address, safe_body
 from sacbus.mother.statistics import NodeStatistics
 
 __all__ = ["SAC_MASTER", "SacMaster", "SacMasterKind"]
+
+#: Lines that are kept taken apart: who polls says the same to each node again and again.
+LINES: Final = 1_024
 
 
 class SacMaster:
@@ -85,6 +89,7 @@ class SacMasterKind:
         return SacMaster(Caller(clock, send, rate=rate, slack=late, unsent=unsent))
 
 
+@lru_cache(LINES)
 def _taken_apart(line: str) -> tuple[Addressed, bytes]:
     node, command = addressed_line(line)
     try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 from sacbus.language.line import quoted
@@ -30,6 +31,9 @@ from sacbus.wire.superstepper import (
 )
 
 __all__ = ["COMMANDS", "Command", "Meaning", "Order", "Word", "meaning", "read_line"]
+
+#: Lines that are kept as read: who polls says the same to each module again and again.
+LINES: Final = 1_024
 
 _BYTE: Final = 0xFF
 _WORD: Final = 0xFFFF
@@ -248,6 +252,7 @@ def meaning(command: Command, answer: Answer) -> str:
     return words + (f" (it has seen: {', '.join(answer.flags)})" if answer.flags else "")
 
 
+@lru_cache(LINES)
 def read_line(line: str) -> Order:
     """A line by the table; BadRequest, naming what is expected, for a wrong one."""
     first, *words = line.split() or [""]
