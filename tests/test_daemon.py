@@ -784,3 +784,18 @@ def test_those_who_leave_are_heard_to_the_end_but_not_without_bound() -> None:
             assert 4_000 <= bus.bus.medium.counters().bytes < 30 * 4_000
 
     virtually(scene())
+
+
+@pytest.mark.parametrize("run", [virtually, asyncio.run])
+def test_a_bus_beside_another_has_its_time_and_leaves_it_running(
+    run: Callable[[Coroutine[Any, Any, None]], None],
+) -> None:
+    async def scene() -> None:
+        async with open_bus(Configuration(nodes=(10,), name="one")) as one:
+            async with open_bus(Configuration(nodes=(10,), name="other"), beside=one) as other:
+                assert other.host.kernel is one.host.kernel
+                await asyncio.gather(one.mother().send(10, "V1"), other.mother().send(10, "V1"))
+                assert one.now() <= other.now()
+            await one.mother().send(10, "V2")
+
+    run(scene())
