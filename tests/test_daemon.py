@@ -791,7 +791,7 @@ def test_a_bus_beside_another_has_its_time_and_leaves_it_running(
     run: Callable[[Coroutine[Any, Any, None]], None],
 ) -> None:
     async def scene() -> None:
-        async with open_bus(Configuration(nodes=(10,), name="one")) as one:
+        async with asyncio.timeout(20), open_bus(Configuration(nodes=(10,), name="one")) as one:
             async with open_bus(Configuration(nodes=(10,), name="other"), beside=one) as other:
                 assert other.host.kernel is one.host.kernel
                 await asyncio.gather(one.mother().send(10, "V1"), other.mother().send(10, "V1"))
