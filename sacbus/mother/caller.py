@@ -19,11 +19,12 @@ from sacbus.mother.errors import LineLost, MotherError
 from sacbus.mother.estop import EmergencyStop
 from sacbus.mother.outcome import Acknowledged, Done, Sent
 from sacbus.mother.pending import Pending
-from sacbus.mother.request import checked_address, safe_body
+from sacbus.mother.request import checked_address, safe_packet
 from sacbus.mother.soft_ops import SoftOpHeard, soft_op
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
     GENERAL_CALL,
+    MAX_BODY,
     MOTHER,
     Answer,
     LineFault,
@@ -84,8 +85,14 @@ class Caller:
         #: appointment of one before.
         self._due: Ns = 0
         self._look_at: Ns | None = None
-        #: When an answer is due by the line's own figures, after how long, by the body's size.
-        self._expected: dict[int, Ns] = {}
+        #: From the first bit of a packet to the last of its answer by the line's own figures, by the
+        #: length of the body.
+        self._line_times: list[Ns] = [
+            self._rate.span(body + FRAME_BYTES)
+            + turnaround(body, nul_follows=True)
+            + self._rate.span(ANSWER_BYTES)
+            for body in range(MAX_BODY + _PADDING + 1)
+        ]
         #: Nodes that were given up before all of the slack was over, and when that is.
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
@@ -94,7 +101,8 @@ class Caller:
         #: The emergency stop that is under way, and who waits for its end.
         self._stop: EmergencyStop | None = None
         self._stopping: list[Done] = []
-        self._lost: LineLost | None = None
+        #: Why nothing can be sent any more; None while it can.
+        self.lost: LineLost | None = None
         self.statistics: defaultdict[int, NodeStatistics] = defaultdict(NodeStatistics)
         #: Packets of others, answers that nobody waits for, and line faults, counted.
         self.overheard = 0
@@ -121,18 +129,9 @@ class Caller:
         accepts that it may run twice; NAK always is, since a node that says NAK has not acted.
         :class:`BadRequest` at once for what cannot be sent.
         """
-        checked_address(node)
-        body = safe_body(line)
+        body, data = safe_packet(checked_address(node), line)
         self._enqueue(
-            Pending(
-                node,
-                body,
-                encode(node, MOTHER, body),
-                done,
-                accept_duplicates,
-                self._tries,
-                self._slack,
-            )
+            Pending(node, body, data, done, accept_duplicates, self._tries, self._slack)
         )
 
     def probe(self, node: int, slack: Ns, done: Done) -> None:
@@ -149,17 +148,9 @@ class Caller:
 
     def broadcast(self, line: bytes, done: Done) -> None:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
-        body = safe_body(line)
+        body, data = safe_packet(GENERAL_CALL, line)
         self._enqueue(
-            Pending(
-                GENERAL_CALL,
-                body,
-                encode(GENERAL_CALL, MOTHER, body),
-                done,
-                may_repeat=False,
-                tries=1,
-                slack=0,
-            )
+            Pending(GENERAL_CALL, body, data, done, may_repeat=False, tries=1, slack=0)
         )
 
     def estop(self, done: Done) -> None:
@@ -170,8 +161,8 @@ class Caller:
         outstanding ends as it does, but is not sent again. ``done`` comes when the line is free.
         What is asked from now on has its turn after that.
         """
-        if self._lost is not None:
-            done(self._lost)
+        if self.lost is not None:
+            done(self.lost)
             return
         self.stops += 1
         self._stopping.append(done)
@@ -220,27 +211,22 @@ class Caller:
                 if self.soft_op_listeners:
                     self._tell_soft_op(event)
 
-    @property
-    def lost(self) -> LineLost | None:
-        """Why nothing can be sent any more; None while it can."""
-        return self._lost
-
     def lose(self, why: str) -> None:
         """The line is gone: everything that waits fails, and so does all that is asked later."""
-        self._lost = LineLost(why)
+        self.lost = LineLost(why)
         waiting = [self._outstanding, self._broadcasting, *self._waiting]
         self._outstanding = self._broadcasting = None
         self._waiting.clear()
         if self._stop is not None:
             self._stop.end()
-        self._end_stop(self._lost)
+        self._end_stop(self.lost)
         for request in waiting:
             if request is not None:
-                request.done(self._lost)
+                request.done(self.lost)
 
     def _enqueue(self, request: Pending) -> None:
-        if self._lost is not None:
-            request.done(self._lost)
+        if self.lost is not None:
+            request.done(self.lost)
             return
         self._waiting.append(request)
         self._next()
@@ -342,20 +328,12 @@ class Caller:
 
         For a line of ``body`` bytes; on a line that takes at once what it is given.
         """
-        attempt = self._line_time(body + _PADDING) + self._slack + self._gap
+        attempt = self._line_times[body + _PADDING] + self._slack + self._gap
         return self._gap + self._tries * attempt
 
     def _patience(self, request: Pending) -> Ns:
         """How long an answer may take, from the packet's first bit on."""
-        return self._line_time(len(request.body)) + request.slack
-
-    def _line_time(self, body: int) -> Ns:
-        """From the first bit of a packet to the last of its answer, by the line's own figures."""
-        known = self._expected.get(body)
-        if known is None:
-            answer = turnaround(body, nul_follows=True) + self._rate.span(ANSWER_BYTES)
-            known = self._expected[body] = self._rate.span(body + FRAME_BYTES) + answer
-        return known
+        return self._line_times[len(request.body)] + request.slack
 
     def _silent(self, request: Pending) -> None:
         self._outstanding = None
