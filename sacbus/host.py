@@ -243,8 +243,8 @@ class RealHost:
 
     def _next_wake_up(self) -> Ns | None:
         """When the clock must be moved next, in bus time; None: not before something comes in."""
-        when, loud = self.kernel.next_at(), self.kernel.next_loud_at()
-        if when is None or when == loud:
+        when = self.kernel.next_at()
+        if when is None or when == (loud := self.kernel.next_loud_at()):
             return when
         # It is quiet.
         latest = when + self._leisure
@@ -291,13 +291,14 @@ class _VirtualSelector(selectors.DefaultSelector):
                 )
             return super().select(None)
         self.called = False
-        kernel.run_next()
+        # All of that instant; the clock then stands at it, as there is one at least.
+        kernel.run_due(when)
         # To go round the loop for each of them would take longer than most of them do.
         while alone and not self.called:
             when = kernel.next_at()
             if when is None or (limit is not None and when > limit):
                 break
-            kernel.run_until(when)
+            kernel.run_due(when)
         return []
 
 

@@ -146,7 +146,8 @@ class Kernel:
 
     def next_at(self) -> Ns | None:
         """When the next event is due; None when nothing is."""
-        when = self._first_of(self._loud)
+        loud = self._loud
+        when: Ns | None = loud[0][0] if loud and loud[0][2] is not None else self._first_of(loud)
         if self._quiet:
             quiet = self._first_of(self._quiet)
             if when is None or (quiet is not None and quiet < when):

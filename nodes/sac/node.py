@@ -136,13 +136,17 @@ class SacNode:
     @property
     def quiet(self) -> bool:
         """True while it has nothing to send, and nobody is to be told of starts and ends."""
-        return self._sends_at() is None and not self._commands.tells_ops and self._start is None
+        if self._start is not None:
+            return False
+        sends = self._network.due
+        if self._ports is not None:
+            sends = self._ports.due(sends)
+        return sends is None and not self._commands.tells_ops
 
     def hear(self, heard: Heard, now: Ns) -> None:
         """Bytes from the line."""
         self.now = now
-        keys = None if self._ports is None else self._ports.keys(heard)
-        if keys is None:
+        if self._ports is None or (keys := self._ports.keys(heard)) is None:
             self._network.hear(heard)
         else:
             self._terminal_keys(keys, now)
@@ -153,15 +157,13 @@ class SacNode:
         """The next answer or packet to send, the end of the command that runs, or of a boot."""
         if self._start is not None:
             return self._start.over
-        sends = self._sends_at()
+        sends = self._network.due
+        if self._ports is not None:
+            sends = self._ports.due(sends)
         ends = self._commands.due
         if sends is None:
             return ends
         return sends if ends is None or sends < ends else ends
-
-    def _sends_at(self) -> Ns | None:
-        due = self._network.due
-        return due if self._ports is None else self._ports.due(due)
 
     def wake(self, now: Ns) -> bytes | None:
         """End what is over; send what is due."""

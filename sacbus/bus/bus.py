@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Final
 
 from sacbus.bus.hearing import WrongBaud
@@ -86,7 +87,7 @@ class Bus:
             lanes=protocol.lanes if lanes is None else lanes,
             seed=seed,
         )
-        self._routes.transmit = self._transmit
+        self._routes.transmit = partial(self.medium.transmit, lane=self.medium.node_lane)
         #: Everything reported out of band, newest last, bounded; and counts by kind, unbounded.
         self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
         self.report_counts: Counter[str] = Counter()
@@ -127,9 +128,6 @@ class Bus:
         """Ask a node anew when it wants to be woken, after it was driven from outside the bus."""
         self._routes.touch(node)
 
-    def _transmit(self, node: Node, data: bytes) -> None:
-        self.medium.transmit(node, data, self.medium.node_lane)
-
 
 class _Routes:
     """Who hears what among the nodes, and when each of them wants to be woken."""
@@ -142,7 +140,7 @@ class _Routes:
         self._by_address: dict[int, list[_Seat]] = {}
         #: Seats whose receiver stands open. A dict for its order: the same in every run.
         self._open: dict[_Seat, None] = {}
-        self.transmit: Callable[[Node, bytes], None]
+        self.transmit: Callable[[Node, bytes], object]
 
     def concerns(self, data: bytes) -> bool:
         if self._open:

@@ -404,7 +404,10 @@ class Medium:
 
     def _rest_matters(self, place: _Lane, sent: Transmission, upto: int) -> bool:
         """Whether anybody will notice what follows the last cut (for one SAC packet: its NUL)."""
-        if self.watchers or sent.collided or self._router.concerns(sent.data[upto:]):
+        if self.watchers or sent.hits is not None:
             return True
         sender = sent.sender
-        return any([owner is not sender for owner, _ in place.listeners])  # noqa: C419 (quicker)
+        for owner, _ in place.listeners:
+            if owner is not sender:
+                return True
+        return self._router.concerns(sent.data[upto:])

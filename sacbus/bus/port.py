@@ -145,10 +145,9 @@ class Port:
         now = kernel.now
         if now != self._until:
             free_at = medium.free_at(self._lane)
-            earliest = now if free_at is None else max(now, free_at + self._latency)
-            if earliest > now:
+            if free_at is not None and free_at + self._latency > now:
                 self._waiting = True
-                kernel.at(earliest, self._start)
+                kernel.at(free_at + self._latency, self._start)
                 return
         buffer = self._buffer
         chunk = bytes(buffer if len(buffer) <= CHUNK else buffer[:CHUNK])
