@@ -61,6 +61,9 @@ LEAD: Final[Ns] = 500 * US
 #: to do is, and programs that time each other on the line begin to notice.
 BEHIND: Final[Ns] = 10 * MS
 
+#: Later than any event.
+_FOR_EVER: Final[Ns] = 2**63
+
 #: Seconds from one word about lateness to the next.
 _SPARE: Final = 1.0
 
@@ -263,20 +266,31 @@ class _VirtualSelector(selectors.DefaultSelector):
     """Instead of waiting, moves the kernel. Descriptors are looked at, never waited for."""
 
     kernel: Kernel
+    #: True while only asyncio's own wake-up pipe is registered: nothing comes from outside.
+    alone = True
     #: True once the loop has been asked to run something in a thread, which may take its time.
     threads = False
-    #: Set when the loop has been given something to do, which the kernel must not run away from.
-    called = False
+
+    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:  # noqa: ANN401 (as the system's)
+        key = super().register(fileobj, events, data)
+        self.alone = len(self.get_map()) <= 1
+        return key
+
+    def unregister(self, fileobj: Any) -> selectors.SelectorKey:  # noqa: ANN401 (as the system's)
+        key = super().unregister(fileobj)
+        self.alone = len(self.get_map()) <= 1
+        return key
 
     def select(self, timeout: float | None = None) -> list[Any]:
-        ready = super().select(0)
-        if ready or (timeout is not None and timeout <= 0):
+        alone = self.alone and not self.threads
+        busy = timeout is not None and timeout <= 0
+        # With something to do already the loop learns nothing from its wake-up pipe.
+        ready = [] if alone and busy else super().select(0)
+        if ready or busy:
             return ready
         kernel = self.kernel
         when = kernel.next_at()
         limit = None
-        # Only asyncio's own wake-up pipe is registered: nothing comes from outside, nor of threads.
-        alone = len(self.get_map()) <= 1 and not self.threads
         if timeout is not None:
             # Rounded up: a timer must not find itself a nanosecond short of its time.
             limit = kernel.now + int(timeout * SECOND) + 1
@@ -290,14 +304,11 @@ class _VirtualSelector(selectors.DefaultSelector):
                     "bus, no timer and no descriptor will ever bring"
                 )
             return super().select(None)
-        self.called = False
-        # All of that instant; the clock then stands at it, as there is one at least.
-        kernel.run_due(when)
-        # To go round the loop for each of them would take longer than most of them do.
-        while alone and not self.called:
-            when = kernel.next_at()
-            if when is None or (limit is not None and when > limit):
-                break
+        if alone:
+            # To go round the loop for each instant would take longer than most of them do. The loop
+            # ends this when it has been given something to do, which time must not run away from.
+            kernel.run_due(_FOR_EVER if limit is None else limit, pausable=True)
+        else:
             kernel.run_due(when)
         return []
 
@@ -326,7 +337,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         return super().call_soon(callback, *args, context=context)
 
     def call_at(
@@ -337,7 +348,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         return super().call_at(when, callback, *args, context=context)
 
     def call_soon_threadsafe(
@@ -347,12 +358,12 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         return super().call_soon_threadsafe(callback, *args, context=context)
 
     def stop(self) -> None:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         super().stop()
 
     def run_in_executor(

@@ -85,7 +85,7 @@ class Caller:
         #: appointment of one before.
         self._due: Ns = 0
         self._look_at: Ns | None = None
-        #: From the first bit of a packet to the last of its answer by the line's own figures, by the
+        #: From a packet's first bit to its answer's last by the line's own figures, by the
         #: length of the body.
         self._line_times: list[Ns] = [
             self._rate.span(body + FRAME_BYTES)
@@ -130,9 +130,7 @@ class Caller:
         :class:`BadRequest` at once for what cannot be sent.
         """
         body, data = safe_packet(checked_address(node), line)
-        self._enqueue(
-            Pending(node, body, data, done, accept_duplicates, self._tries, self._slack)
-        )
+        self._enqueue(Pending(node, body, data, done, accept_duplicates, self._tries, self._slack))
 
     def probe(self, node: int, slack: Ns, done: Done) -> None:
         """Ask once, with the empty line, whether anybody is at ``node``, and wait ``slack`` only.
@@ -149,9 +147,7 @@ class Caller:
     def broadcast(self, line: bytes, done: Done) -> None:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
         body, data = safe_packet(GENERAL_CALL, line)
-        self._enqueue(
-            Pending(GENERAL_CALL, body, data, done, may_repeat=False, tries=1, slack=0)
-        )
+        self._enqueue(Pending(GENERAL_CALL, body, data, done, may_repeat=False, tries=1, slack=0))
 
     def estop(self, done: Done) -> None:
         """Have everybody stop now: S at once and twice more, whatever is outstanding.
