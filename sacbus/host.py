@@ -22,11 +22,14 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import Executor
 from contextvars import Context
 from math import inf
-from typing import Any, Final, TypeVar, TypeVarTuple
+from typing import TYPE_CHECKING, Any, Final, TypeVar, TypeVarTuple
 from typing import Protocol as Contract
 
 from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from sacbus.lateness import Lateness
+
+if TYPE_CHECKING:
+    from _typeshed import FileDescriptorLike
 
 __all__ = [
     "BEHIND",
@@ -159,11 +162,8 @@ class RealHost:
         self._busy = True
         try:
             now = self.bus_now()
-            due = kernel.next_at()
-            if due is not None and due <= now:
+            if not kernel.pass_until(now):  # it mostly does when bytes come in
                 self._catch_up(now)
-            else:
-                kernel.run_until(now)
             callback(*arguments)
             if self._line_free_at is not None:
                 self._run_ahead(self._line_free_at, now)
@@ -223,8 +223,12 @@ class RealHost:
         """Run the line's events without waiting, and move the anchor by what that gained."""
         kernel = self.kernel
         # Each round may put the line to use for longer; the clock stays at the last event.
-        while (free_at := line_free_at()) is not None and kernel.run_due(free_at + _IDLE):
-            pass
+        while (
+            (when := kernel.next_at()) is not None
+            and (free_at := line_free_at()) is not None
+            and when <= free_at + _IDLE
+        ):
+            kernel.run_due(free_at + _IDLE)
         # From when this began: what the clock has gone on meanwhile passes on the bus too.
         if kernel.now > now:
             self._bus_anchor += kernel.now - now
@@ -271,12 +275,14 @@ class _VirtualSelector(selectors.DefaultSelector):
     #: True once the loop has been asked to run something in a thread, which may take its time.
     threads = False
 
-    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:  # noqa: ANN401 (as the system's)
+    def register(
+        self, fileobj: FileDescriptorLike, events: int, data: object = None
+    ) -> selectors.SelectorKey:
         key = super().register(fileobj, events, data)
         self.alone = len(self.get_map()) <= 1
         return key
 
-    def unregister(self, fileobj: Any) -> selectors.SelectorKey:  # noqa: ANN401 (as the system's)
+    def unregister(self, fileobj: FileDescriptorLike) -> selectors.SelectorKey:
         key = super().unregister(fileobj)
         self.alone = len(self.get_map()) <= 1
         return key

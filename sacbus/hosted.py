@@ -265,6 +265,9 @@ class HostedBus:
         def heard(one: Heard, _now: Ns) -> None:
             hear(one.data)
 
+        return self._masters_port(heard)
+
+    def _masters_port(self, heard: Callable[[Heard, Ns], None]) -> Port:
         port = Port(self.bus.medium, heard, latency=0, name="mother")
         self._ports.append(port)
         return port
@@ -281,10 +284,10 @@ class HostedBus:
                 f"{spoken}, take a master of that protocol"
             )
 
-        def hear(data: bytes) -> None:
-            mother.hear(data)
+        def heard(one: Heard, _now: Ns) -> None:
+            caller.hear(one.data)
 
-        port = self.port(hear)
+        port = self._masters_port(heard)
         mother = Mother(
             self.host.kernel,
             port.talk,
@@ -292,6 +295,7 @@ class HostedBus:
             unsent=lambda: port.unsent,
             arrive=self.host.arrive,
         )
+        caller = mother.caller
         self._mothers.append(mother)
         return mother
 

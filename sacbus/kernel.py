@@ -180,13 +180,18 @@ class Kernel:
             self._cancelled -= 1
         return None
 
+    def pass_until(self, limit: Ns) -> bool:
+        """Move the clock to ``limit``, unless an event may be due by then; False if one may."""
+        loud, quiet = self._loud, self._quiet
+        if (loud and loud[0][0] <= limit) or (quiet and quiet[0][0] <= limit):
+            return False
+        if limit > self.now:
+            self.now = limit
+        return True
+
     def run_until(self, limit: Ns) -> int:
         """Run every event due at or before ``limit``, then move the clock there; how many ran."""
-        loud, quiet = self._loud, self._quiet
-        ran = 0
-        # Asked here already, since mostly nothing is due when bytes come in.
-        if (loud and loud[0][0] <= limit) or (quiet and quiet[0][0] <= limit):
-            ran = self.run_due(limit)
+        ran = 0 if self.pass_until(limit) else self.run_due(limit)
         if limit > self.now:
             self.now = limit
         return ran

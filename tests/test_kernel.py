@@ -158,6 +158,17 @@ def test_the_next_instant_runs_whole_and_no_further() -> None:
     assert (ran, kernel.now) == ([10, 10], 10)
 
 
+def test_time_passes_until_a_moment_only_if_nothing_is_due_by_then() -> None:
+    kernel = Kernel()
+    kernel.at(5, print)
+    kernel.at_leisure(3, print)
+    assert (kernel.pass_until(2), kernel.now) == (True, 2)
+    assert (kernel.pass_until(1), kernel.now) == (True, 2)
+    assert (kernel.pass_until(3), kernel.now) == (False, 2)
+    assert (kernel.pass_until(5), kernel.now) == (False, 2)
+    assert (kernel.ran, kernel.next_at()) == (0, 3)
+
+
 @pytest.mark.parametrize(("pausable", "heard"), [(True, "abc"), (False, "abcd")])
 def test_a_pause_ends_a_run_that_allows_it_behind_the_present_instant(
     pausable: bool, heard: str

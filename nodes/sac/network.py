@@ -174,9 +174,9 @@ class NetworkPort:
         if self._waits_for is not None:
             self._put_off(heard, *self._waits_for)
         start = heard.begun_before(self._deaf_until) if self._deaf_until > heard.start else 0
-        receive = self._receiver.receive
+        receiver = self._receiver
         size = len(data)
-        while start < size and (found := receive(data, start)) is not None:
+        while start < size and (found := receiver.receive(data, start)) is not None:
             event, start = found
             if type(event) is Packet:
                 self._packet(event, heard, start)
@@ -185,7 +185,7 @@ class NetworkPort:
             elif type(event) is LineFault:
                 self._owner.tell(ReportKind.LOST, f"a packet whose body is over {MAX_BODY} bytes")
             # An ACK is of no consequence to a SAC: it sends nothing that it would repeat.
-        self.receiving = self._receiver.open or self._waits_for is not None
+        self.receiving = receiver.open or self._waits_for is not None
         self._see_what_is_due()
 
     def send(self, dest: int, body: bytes, not_before: Ns) -> Ns:

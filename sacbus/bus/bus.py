@@ -185,23 +185,21 @@ class _Routes:
 
     def deliver(self, heard: Heard, sender: object, now: Ns) -> None:
         addresses = self._addressed(heard.data)
+        chosen: Sequence[_Seat]
         if addresses is None:
             chosen = self.seats
-        elif not self._open:
-            if not addresses:
-                return
-            chosen = self._by_address.get(addresses[0], [])
-            if len(addresses) > 1:
-                chosen = self._several(addresses, {})
-        else:
+        elif self._open or len(addresses) > 1:
             chosen = self._several(addresses, self._open)
+        elif addresses:
+            chosen = self._by_address.get(addresses[0], ())
+        else:
+            return
         for seat in chosen:
             node = seat.node
-            if node is sender:
-                continue
-            node.hear(heard, now)
-            self._see_if_open(seat)
-            self._appoint(seat)
+            if node is not sender:
+                node.hear(heard, now)
+                self._see_if_open(seat)
+                self._appoint(seat)
 
     def _several(self, addresses: Sequence[int], others: dict[_Seat, None]) -> list[_Seat]:
         chosen = dict(others)

@@ -230,9 +230,9 @@ class Caller:
     def _next(self) -> None:
         """Send the next request if the line is ours."""
         if (
-            self._outstanding is None
+            self._waiting
+            and self._outstanding is None
             and not self._pausing
-            and self._waiting
             and self._stop is None
             and not (self._unsettled and self._may_still_answer(self._waiting[0].node))
         ):

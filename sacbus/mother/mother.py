@@ -95,7 +95,7 @@ class Mother:
                 gap=gap,
                 set_dtr=line.set_dtr,
             )
-            line.start(mother.hear, mother.lose)
+            line.start(mother.caller.hear, mother.lose)
             try:
                 yield mother
             finally:
