@@ -1,8 +1,9 @@
 """Transactions: one request at a time on a half-duplex line, and what becomes of it.
 
-Owns whose turn it is, when an answer is overdue, what may be asked again, the pause after each
-packet, and what an emergency stop does to those who wait. Synchronous; a clock is handed in (the
-kernel, or a loop's), bytes go out through a callable and come in through :meth:`Caller.hear`.
+Owns whose turn it is, what may be asked again, the pause after each packet, and what an emergency
+stop does to those who wait; when an answer is overdue is ``overdue.py``'s business. Synchronous; a
+clock is handed in (the kernel, or a loop's), bytes go out through a callable and come in through
+:meth:`Caller.hear`.
 Source: spec, mother ("Transactions", "Safety").
 """
 
@@ -18,13 +19,13 @@ from sacbus.mother.clock import Clock
 from sacbus.mother.errors import LineLost, MotherError
 from sacbus.mother.estop import EmergencyStop
 from sacbus.mother.outcome import Acknowledged, Done, Sent
+from sacbus.mother.overdue import Overdue
 from sacbus.mother.pending import Pending
 from sacbus.mother.request import checked_address, safe_packet
 from sacbus.mother.soft_ops import SoftOpHeard, soft_op
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
     GENERAL_CALL,
-    MAX_BODY,
     MOTHER,
     Answer,
     LineFault,
@@ -32,19 +33,13 @@ from sacbus.wire import (
     PacketReceiver,
     encode,
 )
-from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
+from sacbus.wire.times import MOTHER_GAP
 
 __all__ = ["SLACK", "TRIES", "Caller"]
 
 #: How long an answer may be late beyond the line's own figures, on a line in this process, once
 #: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
-
-#: What makes a packet of a body: STX, two addresses, ETX, CRC, NUL.
-FRAME_BYTES: Final = 6
-
-#: The space that a body may need for its CRC.
-_PADDING: Final = 1
 
 #: Attempts for what may be repeated.
 TRIES: Final = 3
@@ -80,19 +75,9 @@ class Caller:
         self._receiver = PacketReceiver()
         self._waiting: deque[Pending] = deque()
         self._outstanding: Pending | None = None
-        #: When the outstanding request's answer is overdue, and for when the next look at it is
-        #: appointed. Nearly all answers come in time, and nearly all requests do with the
-        #: appointment of one before.
-        self._due: Ns = 0
-        self._look_at: Ns | None = None
-        #: From a packet's first bit to its answer's last by the line's own figures, by the
-        #: length of the body.
-        self._line_times: list[Ns] = [
-            self._rate.span(body + FRAME_BYTES)
-            + turnaround(body, nul_follows=True)
-            + self._rate.span(ANSWER_BYTES)
-            for body in range(MAX_BODY + _PADDING + 1)
-        ]
+        self._overdue = Overdue(
+            clock, self._rate, lambda: self._outstanding, self._silent, self._unsent
+        )
         #: Nodes that were given up before all of the slack was over, and when that is.
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
@@ -262,10 +247,7 @@ class Caller:
             clock.at(now + line_time + self._gap, self._broadcast_over)
         else:
             self._outstanding = request
-            self._due = now + self._patience(request)
-            if self._look_at is None or self._due < self._look_at:
-                self._look_at = self._due
-                clock.at(self._due, self._look)
+            self._overdue.mind(request, now)
         self._send(request.data)
 
     def _tell_soft_op(self, packet: Packet) -> None:
@@ -301,35 +283,13 @@ class Caller:
             self._pause()
             request.done(request.failure())
 
-    def _look(self) -> None:
-        """See whether the answer that we wait for is overdue."""
-        now = self._clock.now
-        if self._look_at is None or self._look_at > now:
-            return  # one that an earlier one has made needless
-        self._look_at = None
-        request = self._outstanding
-        if request is None:
-            return
-        if self._due <= now and self._unsent is not None and self._unsent():
-            self._due = now + self._patience(request)
-        if self._due > now:
-            # Another one than the look was for.
-            self._look_at = self._due
-            self._clock.at(self._due, self._look)
-        else:
-            self._silent(request)
-
     def longest_call(self, body: int) -> Ns:
         """How long a call may take once it is its turn, if every attempt but the last fails.
 
         For a line of ``body`` bytes; on a line that takes at once what it is given.
         """
-        attempt = self._line_times[body + _PADDING] + self._slack + self._gap
+        attempt = self._overdue.line_time(body) + self._slack + self._gap
         return self._gap + self._tries * attempt
-
-    def _patience(self, request: Pending) -> Ns:
-        """How long an answer may take, from the packet's first bit on."""
-        return self._line_times[len(request.body)] + request.slack
 
     def _silent(self, request: Pending) -> None:
         self._outstanding = None
