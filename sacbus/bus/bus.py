@@ -152,15 +152,13 @@ class _Routes:
         seat = _Seat(node, len(self.seats))
         self.seats.append(seat)
         self._by_address.setdefault(seat.address, []).append(seat)
-        self._see_if_open(seat)
-        self._appoint(seat)
+        self._mind(seat)
 
     def touch(self, node: Node) -> None:
         for seat in self.seats:
             if seat.node is node:
                 self._follow(seat)
-                self._see_if_open(seat)
-                self._appoint(seat)
+                self._mind(seat)
 
     def address_of(self, sender: object) -> int | None:
         for seat in self.seats:
@@ -180,8 +178,7 @@ class _Routes:
         for seat in chosen:
             if seat.node is not sender and wanted(seat.address):
                 seat.node.hear(heard, now)
-                self._see_if_open(seat)
-                self._appoint(seat)
+                self._mind(seat)
 
     def deliver(self, heard: Heard, sender: object, now: Ns) -> None:
         addresses = self._addressed(heard.data)
@@ -198,8 +195,7 @@ class _Routes:
             node = seat.node
             if node is not sender:
                 node.hear(heard, now)
-                self._see_if_open(seat)
-                self._appoint(seat)
+                self._mind(seat)
 
     def _several(self, addresses: Sequence[int], others: dict[_Seat, None]) -> list[_Seat]:
         chosen = dict(others)
@@ -208,15 +204,19 @@ class _Routes:
                 chosen[seat] = None
         return sorted(chosen, key=lambda seat: seat.order)
 
-    def _appoint(self, seat: _Seat) -> None:
-        """Make the node's next appointment, unless one as early stands already.
+    def _mind(self, seat: _Seat) -> None:
+        """See what a node wants after something was done to it: to hear all, and to be woken.
 
-        One that stands for later is kept: usually the node will want it again (the end of its
-        motion, after the answer that comes first). When it comes and does not count, nothing
-        happens; when too many stand, those that do not count are cancelled. A node that is not
-        quiet gets one that is punctual.
+        Its next appointment is made, unless one as early stands already. One that stands for later
+        is kept: usually the node will want it again (the end of its motion, after the answer that
+        comes first). When it comes and does not count, nothing happens; when too many stand, those
+        that do not count are cancelled. A node that is not quiet gets one that is punctual.
         """
         node = seat.node
+        if node.receiving:
+            self._open[seat] = None
+        elif self._open:
+            self._open.pop(seat, None)
         when = node.wake_at()
         if when is None:
             return
@@ -248,8 +248,7 @@ class _Routes:
             self.transmit(node, data)
         if node.address != seat.address:
             self._follow(seat)
-        self._see_if_open(seat)
-        self._appoint(seat)
+        self._mind(seat)
 
     def _follow(self, seat: _Seat) -> None:
         """See to it that a node is found at the address that it has now."""
@@ -258,9 +257,3 @@ class _Routes:
         seats = self._by_address.setdefault(seat.address, [])
         seats.append(seat)
         seats.sort(key=lambda one: one.order)
-
-    def _see_if_open(self, seat: _Seat) -> None:
-        if seat.node.receiving:
-            self._open[seat] = None
-        elif self._open:
-            self._open.pop(seat, None)
