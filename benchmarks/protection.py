@@ -22,6 +22,7 @@ from typing import BinaryIO
 from benchmarks.executions import Executions
 from benchmarks.prediction import Predicted, bound
 from nodes.sac import SacNode, SacSettings
+from nodes.sac.board import SacBoard
 from nodes.sac.protocol import SAC_PROTOCOL
 from sacbus.bus import BitErrors, Bus, Port
 from sacbus.configuration import Configuration
@@ -49,8 +50,8 @@ SPEEDS = range(900, 1_000)
 MOVE = re.compile(rb"m(\d{1,2})v9\d\d ?")
 
 
-class Telling(SacNode):
-    """A SAC that tells what it accepts from the line, as (its address, line)."""
+class Telling(SacBoard):
+    """The parts of a SAC, which tells what it accepts from the line, as (its address, line)."""
 
     __slots__ = ("account", "executed")
 
@@ -59,7 +60,7 @@ class Telling(SacNode):
     executed: list[bytes]
 
     def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
-        self.account.append((self.address, body))
+        self.account.append((self.network.address, body))
         self.executed.append(body)
         super().network_line(body, source, destination, now)
 
@@ -83,9 +84,11 @@ class Study:
         self.nodes: dict[int, Telling] = {}
         self._random = Random(seed)
         for address in ADDRESSES:
-            node = Telling(address, SacSettings(), self.bus.rate, self.bus.tell)
-            node.account, node.executed = self.account, []
-            self.nodes[address] = node
+            made = address, SacSettings(), self.bus.rate, self.bus.tell
+            node = SacNode(*made)
+            node.board = telling = Telling(*made)
+            telling.account, telling.executed = self.account, []
+            self.nodes[address] = telling
             self.bus.add(node)
         self._port = Port(
             self.bus.medium, lambda heard, _now: self._hear(heard.data), latency=0, name="mother"
@@ -143,7 +146,7 @@ class Study:
         for address, node in self.nodes.items():
             moves = [MOVE.fullmatch(line) for line in node.executed]
             steps = sum(int(move[1]) for move in moves if move)
-            where = node.snapshot(self.kernel.now).position_pulses
+            where, _, _ = node.engine.where(self.kernel.now)
             stands = where == steps == self.found.position(address)
             stand[stands if all(moves) else None] += 1
         return stand[True], stand[False], stand[None]

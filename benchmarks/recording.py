@@ -34,7 +34,7 @@ async def looping(sink: BinaryIO | None) -> int:
     async with open_bus(Configuration(nodes=NODES)) as bus:
         for node in bus.bus.nodes:
             assert isinstance(node, SacNode)
-            node.commands.queue.load(rows)
+            node.board.commands.queue.load(rows)
         recorder = None if sink is None else Recorder(bus, sink)
         mother = bus.mother()
         for address in NODES:

@@ -22,11 +22,14 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import Executor
 from contextvars import Context
 from math import inf
-from typing import Any, Final, TypeVar, TypeVarTuple
+from typing import TYPE_CHECKING, Any, Final, TypeVar, TypeVarTuple
 from typing import Protocol as Contract
 
 from sacbus.kernel import MS, SECOND, US, Kernel, Ns
 from sacbus.lateness import Lateness
+
+if TYPE_CHECKING:
+    from _typeshed import FileDescriptorLike
 
 __all__ = [
     "BEHIND",
@@ -60,6 +63,9 @@ LEAD: Final[Ns] = 500 * US
 #: Later than this, ns of wall time, an event is worth a word: no scheduler that has nothing better
 #: to do is, and programs that time each other on the line begin to notice.
 BEHIND: Final[Ns] = 10 * MS
+
+#: Later than any event.
+_FOR_EVER: Final[Ns] = 2**63
 
 #: Seconds from one word about lateness to the next.
 _SPARE: Final = 1.0
@@ -156,11 +162,8 @@ class RealHost:
         self._busy = True
         try:
             now = self.bus_now()
-            due = kernel.next_at()
-            if due is not None and due <= now:
+            if not kernel.pass_until(now):  # it mostly does when bytes come in
                 self._catch_up(now)
-            else:
-                kernel.run_until(now)
             callback(*arguments)
             if self._line_free_at is not None:
                 self._run_ahead(self._line_free_at, now)
@@ -220,8 +223,12 @@ class RealHost:
         """Run the line's events without waiting, and move the anchor by what that gained."""
         kernel = self.kernel
         # Each round may put the line to use for longer; the clock stays at the last event.
-        while (free_at := line_free_at()) is not None and kernel.run_due(free_at + _IDLE):
-            pass
+        while (
+            (when := kernel.next_at()) is not None
+            and (free_at := line_free_at()) is not None
+            and when <= free_at + _IDLE
+        ):
+            kernel.run_due(free_at + _IDLE)
         # From when this began: what the clock has gone on meanwhile passes on the bus too.
         if kernel.now > now:
             self._bus_anchor += kernel.now - now
@@ -243,8 +250,8 @@ class RealHost:
 
     def _next_wake_up(self) -> Ns | None:
         """When the clock must be moved next, in bus time; None: not before something comes in."""
-        when, loud = self.kernel.next_at(), self.kernel.next_loud_at()
-        if when is None or when == loud:
+        when = self.kernel.next_at()
+        if when is None or when == (loud := self.kernel.next_loud_at()):
             return when
         # It is quiet.
         latest = when + self._leisure
@@ -263,20 +270,33 @@ class _VirtualSelector(selectors.DefaultSelector):
     """Instead of waiting, moves the kernel. Descriptors are looked at, never waited for."""
 
     kernel: Kernel
+    #: True while only asyncio's own wake-up pipe is registered: nothing comes from outside.
+    alone = True
     #: True once the loop has been asked to run something in a thread, which may take its time.
     threads = False
-    #: Set when the loop has been given something to do, which the kernel must not run away from.
-    called = False
+
+    def register(
+        self, fileobj: FileDescriptorLike, events: int, data: object = None
+    ) -> selectors.SelectorKey:
+        key = super().register(fileobj, events, data)
+        self.alone = len(self.get_map()) <= 1
+        return key
+
+    def unregister(self, fileobj: FileDescriptorLike) -> selectors.SelectorKey:
+        key = super().unregister(fileobj)
+        self.alone = len(self.get_map()) <= 1
+        return key
 
     def select(self, timeout: float | None = None) -> list[Any]:
-        ready = super().select(0)
-        if ready or (timeout is not None and timeout <= 0):
+        alone = self.alone and not self.threads
+        busy = timeout is not None and timeout <= 0
+        # With something to do already the loop learns nothing from its wake-up pipe.
+        ready = [] if alone and busy else super().select(0)
+        if ready or busy:
             return ready
         kernel = self.kernel
         when = kernel.next_at()
         limit = None
-        # Only asyncio's own wake-up pipe is registered: nothing comes from outside, nor of threads.
-        alone = len(self.get_map()) <= 1 and not self.threads
         if timeout is not None:
             # Rounded up: a timer must not find itself a nanosecond short of its time.
             limit = kernel.now + int(timeout * SECOND) + 1
@@ -290,14 +310,12 @@ class _VirtualSelector(selectors.DefaultSelector):
                     "bus, no timer and no descriptor will ever bring"
                 )
             return super().select(None)
-        self.called = False
-        kernel.run_next()
-        # To go round the loop for each of them would take longer than most of them do.
-        while alone and not self.called:
-            when = kernel.next_at()
-            if when is None or (limit is not None and when > limit):
-                break
-            kernel.run_until(when)
+        if alone:
+            # To go round the loop for each instant would take longer than most of them do. The loop
+            # ends this when it has been given something to do, which time must not run away from.
+            kernel.run_due(_FOR_EVER if limit is None else limit, pausable=True)
+        else:
+            kernel.run_due(when)
         return []
 
 
@@ -325,7 +343,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         return super().call_soon(callback, *args, context=context)
 
     def call_at(
@@ -336,7 +354,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         return super().call_at(when, callback, *args, context=context)
 
     def call_soon_threadsafe(
@@ -346,12 +364,12 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         return super().call_soon_threadsafe(callback, *args, context=context)
 
     def stop(self) -> None:
         """As asyncio's."""
-        self._virtual_selector.called = True
+        self.kernel.pause()
         super().stop()
 
     def run_in_executor(

@@ -269,6 +269,9 @@ class HostedBus:
         def heard(one: Heard, _now: Ns) -> None:
             hear(one.data)
 
+        return self._masters_port(heard)
+
+    def _masters_port(self, heard: Callable[[Heard, Ns], None]) -> Port:
         port = Port(self.bus.medium, heard, latency=0, name="mother")
         self._ports.append(port)
         return port
@@ -289,10 +292,10 @@ class HostedBus:
         """
         self.check_mother()
 
-        def hear(data: bytes) -> None:
-            mother.hear(data)
+        def heard(one: Heard, _now: Ns) -> None:
+            caller.hear(one.data)
 
-        port = self.port(hear)
+        port = self._masters_port(heard)
         mother = Mother(
             self.host.kernel,
             port.talk,
@@ -300,6 +303,7 @@ class HostedBus:
             unsent=lambda: port.unsent,
             arrive=self.host.arrive,
         )
+        caller = mother.caller
         self._mothers.append(mother)
         return mother
 

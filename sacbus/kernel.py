@@ -75,7 +75,17 @@ class Kernel:
     Times are ints, ns since the start. Benchmarked against a bare heapq loop (``make bench``).
     """
 
-    __slots__ = ("_cancelled", "_loud", "_order", "_quiet", "now", "ran", "running")
+    __slots__ = (
+        "_cancelled",
+        "_limit",
+        "_loud",
+        "_order",
+        "_pausable",
+        "_quiet",
+        "now",
+        "ran",
+        "running",
+    )
 
     def __init__(self, start: Ns = 0) -> None:
         #: Heaps, each with appointments of one kind.
@@ -90,6 +100,9 @@ class Kernel:
         self.ran = 0
         #: Whether an event is running now: what it sets going must wait until it is over.
         self.running = False
+        #: Up to when the run that is under way goes, and whether :meth:`pause` may end it.
+        self._limit: Ns = start
+        self._pausable = False
 
     def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Appointment:
         """Have ``callback(*arguments)`` run at ``when``; a time that has passed means now.
@@ -146,7 +159,8 @@ class Kernel:
 
     def next_at(self) -> Ns | None:
         """When the next event is due; None when nothing is."""
-        when = self._first_of(self._loud)
+        loud = self._loud
+        when: Ns | None = loud[0][0] if loud and loud[0][2] is not None else self._first_of(loud)
         if self._quiet:
             quiet = self._first_of(self._quiet)
             if when is None or (quiet is not None and quiet < when):
@@ -166,44 +180,59 @@ class Kernel:
             self._cancelled -= 1
         return None
 
+    def pass_until(self, limit: Ns) -> bool:
+        """Move the clock to ``limit``, unless an event may be due by then; False if one may."""
+        loud, quiet = self._loud, self._quiet
+        if (loud and loud[0][0] <= limit) or (quiet and quiet[0][0] <= limit):
+            return False
+        if limit > self.now:
+            self.now = limit
+        return True
+
     def run_until(self, limit: Ns) -> int:
         """Run every event due at or before ``limit``, then move the clock there; how many ran."""
-        loud, quiet = self._loud, self._quiet
-        ran = 0
-        # Asked here already, since mostly nothing is due when bytes come in.
-        if (loud and loud[0][0] <= limit) or (quiet and quiet[0][0] <= limit):
-            ran = self.run_due(limit)
+        ran = 0 if self.pass_until(limit) else self.run_due(limit)
         if limit > self.now:
             self.now = limit
         return ran
 
-    def run_due(self, limit: Ns) -> int:
+    def run_due(self, limit: Ns, *, pausable: bool = False) -> int:
         """Run every event due at or before ``limit``; the clock stays at the last one.
 
         Events may schedule others, which run too if they are due. Returns how many ran. An
         exception of a callback is a defect of ours: it leaves the clock at its event and comes out.
+        ``pausable``: one of the events may end the run by :meth:`pause`.
         """
         loud, quiet = self._loud, self._quiet
         ran = 0
-        self.running = True
+        around = self._limit, self._pausable, self.running
+        self._limit, self._pausable, self.running = limit, pausable, True
         try:
             while True:
                 heap = quiet if quiet and (not loud or quiet[0] < loud[0]) else loud
-                if not heap or heap[0][0] > limit:
+                if not heap or heap[0][0] > self._limit:
                     break
                 appointment = heappop(heap)
-                callback = appointment[2]
+                when, _, callback, arguments, _ = appointment
                 if callback is None:
                     self._cancelled -= 1
                     continue
                 appointment[2] = None
-                self.now = appointment[0]
+                self.now = when
                 ran += 1
-                callback(*appointment[3])
+                callback(*arguments)
         finally:
-            self.running = False
+            self._limit, self._pausable, self.running = around
             self.ran += ran
         return ran
+
+    def pause(self) -> None:
+        """End a pausable run behind the present instant: somebody else has something to do.
+
+        Nothing happens outside of one.
+        """
+        if self._pausable:
+            self._limit = self.now
 
     def run_next(self) -> bool:
         """Run all events of the next instant that has any; False when nothing is due ever."""

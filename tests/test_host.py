@@ -6,7 +6,10 @@ A host in real time is tested on a loop in virtual time: its clock is then as ex
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
 import socket
+import sys
 from collections.abc import Awaitable, Callable
 from math import inf
 
@@ -561,6 +564,21 @@ def test_a_descriptor_that_becomes_ready_is_noticed_in_virtual_time() -> None:
             return await asyncio.get_running_loop().sock_recv(ours, 1)
 
     assert run_virtual(Kernel(), main()) == b"\x06"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="its loops take no signals")
+def test_a_signal_is_noticed_in_virtual_time() -> None:
+    async def main() -> str:
+        loop = asyncio.get_running_loop()
+        came: asyncio.Future[str] = loop.create_future()
+        loop.add_signal_handler(signal.SIGUSR1, came.set_result, "noticed")
+        os.kill(os.getpid(), signal.SIGUSR1)
+        for _ in range(3):
+            await asyncio.sleep(0)
+        async with asyncio.timeout(1):
+            return await came
+
+    assert run_virtual(Kernel(), main()) == "noticed"
 
 
 def test_what_arrives_at_a_virtual_host_is_taken_in_at_once() -> None:

@@ -158,6 +158,54 @@ def test_the_next_instant_runs_whole_and_no_further() -> None:
     assert (ran, kernel.now) == ([10, 10], 10)
 
 
+def test_time_passes_until_a_moment_only_if_nothing_is_due_by_then() -> None:
+    kernel = Kernel()
+    kernel.at(5, print)
+    kernel.at_leisure(3, print)
+    assert (kernel.pass_until(2), kernel.now) == (True, 2)
+    assert (kernel.pass_until(1), kernel.now) == (True, 2)
+    assert (kernel.pass_until(3), kernel.now) == (False, 2)
+    assert (kernel.pass_until(5), kernel.now) == (False, 2)
+    assert (kernel.ran, kernel.next_at()) == (0, 3)
+
+
+@pytest.mark.parametrize(("pausable", "heard"), [(True, "abc"), (False, "abcd")])
+def test_a_pause_ends_a_run_that_allows_it_behind_the_present_instant(
+    pausable: bool, heard: str
+) -> None:
+    kernel = Kernel()
+    ran: list[str] = []
+
+    def pauses() -> None:
+        ran.append("b")
+        kernel.pause()
+        kernel.at(kernel.now, ran.append, "c")
+
+    kernel.at(1, ran.append, "a")
+    kernel.at(2, pauses)
+    kernel.at(3, ran.append, "d")
+    assert kernel.run_due(10, pausable=pausable) == len(heard)
+    assert "".join(ran) == heard
+    kernel.run_until(10)
+    assert (ran, kernel.now) == (["a", "b", "c", "d"], 10)
+
+
+def test_a_pause_outside_of_a_run_or_of_one_within_another_touches_neither() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+
+    def looks_ahead() -> None:
+        kernel.at(2, kernel.pause)
+        kernel.run_due(2)
+        assert kernel.running
+
+    kernel.at(1, looks_ahead)
+    kernel.at(5, ran.append, 5)
+    kernel.pause()
+    kernel.run_due(9, pausable=True)
+    assert (ran, kernel.running) == ([5], False)
+
+
 def test_an_error_comes_out_and_leaves_the_clock_at_its_event_and_the_rest_due() -> None:
     kernel = Kernel()
     ran: list[int] = []

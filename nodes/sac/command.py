@@ -441,15 +441,11 @@ class CommandProcessor:
 
     def _may_retarget(self) -> bool:
         """Whether continuous motion runs, and is not coming to its end."""
-        profile = self._run.profile
         current = self._run.current
-        return (
-            self._preempting is None
-            and current is not None
-            and current.steps is None
-            and profile is not None
-            and profile.duration is None
-        )
+        if current is None or current.steps is not None or self._preempting is not None:
+            return False
+        profile = self._run.profile
+        return profile is not None and profile.duration is None
 
     def _retarget(self, motion: Motion, now: Ns) -> None:
         session = self.session

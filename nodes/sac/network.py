@@ -49,6 +49,10 @@ _GARBLED: Final = bytes((byte ^ 0x55) | 0x80 for byte in range(256))
 
 #: The device's times by body length: every packet asks for two of them.
 _SIZES: Final = range(MAX_BODY + 1)
+# The members of an Enum are slow to look up.
+_UNCHECKED: Final = Verdict.UNCHECKED
+_WRONG: Final = Verdict.WRONG
+
 _AFTER_NUL: Final = [turnaround(size, nul_follows=True) for size in _SIZES]
 _AFTER_TRIGGER: Final = [turnaround(size, nul_follows=False) for size in _SIZES]
 _ENABLED_BEFORE: Final = [enable_lead(size) for size in _SIZES]
@@ -170,9 +174,9 @@ class NetworkPort:
         if self._waits_for is not None:
             self._put_off(heard, *self._waits_for)
         start = heard.begun_before(self._deaf_until) if self._deaf_until > heard.start else 0
-        receive = self._receiver.receive
+        receiver = self._receiver
         size = len(data)
-        while start < size and (found := receive(data, start)) is not None:
+        while start < size and (found := receiver.receive(data, start)) is not None:
             event, start = found
             if type(event) is Packet:
                 self._packet(event, heard, start)
@@ -181,7 +185,7 @@ class NetworkPort:
             elif type(event) is LineFault:
                 self._owner.tell(ReportKind.LOST, f"a packet whose body is over {MAX_BODY} bytes")
             # An ACK is of no consequence to a SAC: it sends nothing that it would repeat.
-        self.receiving = self._receiver.open or self._waits_for is not None
+        self.receiving = receiver.open or self._waits_for is not None
         self._see_what_is_due()
 
     def send(self, dest: int, body: bytes, not_before: Ns) -> Ns:
@@ -217,10 +221,11 @@ class NetworkPort:
                 self.acks += 1
             else:
                 self.naks += 1
+            span = self._answer_span
         else:
             data = self._outbox.pop(0)[1]
-        self._sent_until = now + self._rate.span(len(data)) + ENABLE_LEAD
-        self._enabled_until = self._sent_until
+            span = self._rate.span(len(data))
+        self._sent_until = self._enabled_until = now + span + ENABLE_LEAD
         self._see_what_is_due()
         return data
 
@@ -239,7 +244,8 @@ class NetworkPort:
     def _packet(self, packet: Packet, heard: Heard, index: int) -> None:
         """A verdict has fallen at byte ``index - 1`` of what was heard."""
         size = len(packet.body)
-        wrong = packet.verdict is Verdict.WRONG
+        verdict = packet.verdict
+        wrong = verdict is _WRONG
         triggered = heard.ends(index - 1)
         general = packet.dest == GENERAL_CALL
         self.packets += 1
@@ -266,7 +272,7 @@ class NetworkPort:
                     ReportKind.LOST, "an answer that had not begun when the next was due"
                 )
             self._answer = (nak if wrong else ack)(packet.src, self.address)
-            unchecked = packet.verdict is Verdict.UNCHECKED
+            unchecked = verdict is _UNCHECKED
             self._enable_lead = ENABLE_LEAD_UNCHECKED if unchecked else _ENABLED_BEFORE[size]
         self._answer_at = replies
         if self._turnaround and not self._robust and (answered if wrong else not run):

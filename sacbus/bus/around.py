@@ -18,8 +18,9 @@ __all__ = ["Listener", "Router", "Tap"]
 class Listener(Contract):
     """Whoever hears all bytes of a lane, bytes of overlapped transmissions included."""
 
-    def hear(self, heard: Heard, now: Ns) -> None:
-        """Some bytes have arrived; called in the order of their last bytes."""
+    @property
+    def hear(self) -> Callable[[Heard, Ns], object]:
+        """Some bytes have arrived, now; called in the order of their last bytes."""
         ...
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Final
 
 from sacbus.bus.hearing import WrongBaud
@@ -86,7 +87,7 @@ class Bus:
             lanes=protocol.lanes if lanes is None else lanes,
             seed=seed,
         )
-        self._routes.transmit = self._transmit
+        self._routes.transmit = partial(self.medium.transmit, lane=self.medium.node_lane)
         #: Everything reported out of band, newest last, bounded; and counts by kind, unbounded.
         self.reports: deque[Report] = deque(maxlen=REPORTS_KEPT)
         self.report_counts: Counter[str] = Counter()
@@ -127,9 +128,6 @@ class Bus:
         """Ask a node anew when it wants to be woken, after it was driven from outside the bus."""
         self._routes.touch(node)
 
-    def _transmit(self, node: Node, data: bytes) -> None:
-        self.medium.transmit(node, data, self.medium.node_lane)
-
 
 class _Routes:
     """Who hears what among the nodes, and when each of them wants to be woken."""
@@ -142,7 +140,7 @@ class _Routes:
         self._by_address: dict[int, list[_Seat]] = {}
         #: Seats whose receiver stands open. A dict for its order: the same in every run.
         self._open: dict[_Seat, None] = {}
-        self.transmit: Callable[[Node, bytes], None]
+        self.transmit: Callable[[Node, bytes], object]
 
     def concerns(self, data: bytes) -> bool:
         if self._open:
@@ -154,15 +152,13 @@ class _Routes:
         seat = _Seat(node, len(self.seats))
         self.seats.append(seat)
         self._by_address.setdefault(seat.address, []).append(seat)
-        self._see_if_open(seat)
-        self._appoint(seat)
+        self._mind(seat)
 
     def touch(self, node: Node) -> None:
         for seat in self.seats:
             if seat.node is node:
                 self._follow(seat)
-                self._see_if_open(seat)
-                self._appoint(seat)
+                self._mind(seat)
 
     def address_of(self, sender: object) -> int | None:
         for seat in self.seats:
@@ -182,28 +178,24 @@ class _Routes:
         for seat in chosen:
             if seat.node is not sender and wanted(seat.address):
                 seat.node.hear(heard, now)
-                self._see_if_open(seat)
-                self._appoint(seat)
+                self._mind(seat)
 
     def deliver(self, heard: Heard, sender: object, now: Ns) -> None:
         addresses = self._addressed(heard.data)
+        chosen: Sequence[_Seat]
         if addresses is None:
             chosen = self.seats
-        elif not self._open:
-            if not addresses:
-                return
-            chosen = self._by_address.get(addresses[0], [])
-            if len(addresses) > 1:
-                chosen = self._several(addresses, {})
-        else:
+        elif self._open or len(addresses) > 1:
             chosen = self._several(addresses, self._open)
+        elif addresses:
+            chosen = self._by_address.get(addresses[0], ())
+        else:
+            return
         for seat in chosen:
             node = seat.node
-            if node is sender:
-                continue
-            node.hear(heard, now)
-            self._see_if_open(seat)
-            self._appoint(seat)
+            if node is not sender:
+                node.hear(heard, now)
+                self._mind(seat)
 
     def _several(self, addresses: Sequence[int], others: dict[_Seat, None]) -> list[_Seat]:
         chosen = dict(others)
@@ -212,15 +204,19 @@ class _Routes:
                 chosen[seat] = None
         return sorted(chosen, key=lambda seat: seat.order)
 
-    def _appoint(self, seat: _Seat) -> None:
-        """Make the node's next appointment, unless one as early stands already.
+    def _mind(self, seat: _Seat) -> None:
+        """See what a node wants after something was done to it: to hear all, and to be woken.
 
-        One that stands for later is kept: usually the node will want it again (the end of its
-        motion, after the answer that comes first). When it comes and does not count, nothing
-        happens; when too many stand, those that do not count are cancelled. A node that is not
-        quiet gets one that is punctual.
+        Its next appointment is made, unless one as early stands already. One that stands for later
+        is kept: usually the node will want it again (the end of its motion, after the answer that
+        comes first). When it comes and does not count, nothing happens; when too many stand, those
+        that do not count are cancelled. A node that is not quiet gets one that is punctual.
         """
         node = seat.node
+        if node.receiving:
+            self._open[seat] = None
+        elif self._open:
+            self._open.pop(seat, None)
         when = node.wake_at()
         if when is None:
             return
@@ -252,8 +248,7 @@ class _Routes:
             self.transmit(node, data)
         if node.address != seat.address:
             self._follow(seat)
-        self._see_if_open(seat)
-        self._appoint(seat)
+        self._mind(seat)
 
     def _follow(self, seat: _Seat) -> None:
         """See to it that a node is found at the address that it has now."""
@@ -262,9 +257,3 @@ class _Routes:
         seats = self._by_address.setdefault(seat.address, [])
         seats.append(seat)
         seats.sort(key=lambda one: one.order)
-
-    def _see_if_open(self, seat: _Seat) -> None:
-        if seat.node.receiving:
-            self._open[seat] = None
-        elif self._open:
-            self._open.pop(seat, None)

@@ -46,7 +46,6 @@ class Port:
 
     __slots__ = (
         "_buffer",
-        "_hear",
         "_held",
         "_hold",
         "_lane",
@@ -56,6 +55,7 @@ class Port:
         "_until",
         "_waiting",
         "echo",
+        "hear",
         "name",
     )
 
@@ -74,7 +74,8 @@ class Port:
         self._held = False
         self._medium = medium
         self._lane = medium.master_lane
-        self._hear = hear
+        #: The medium's side: takes what arrives on the line.
+        self.hear = hear
         self._latency = latency
         self._buffer = bytearray()
         #: Their ninth bits, on a line that has some.
@@ -91,16 +92,16 @@ class Port:
         """Bytes that wait for the line."""
         return len(self._buffer)
 
-    def hear(self, heard: Heard, now: Ns) -> None:
-        """The medium's side: pass on what arrived."""
-        self._hear(heard, now)
-
     def talk(self, data: bytes, ninth: int | bytes = 0) -> None:
         """Bytes from outside, arriving now, on a line of ninth bits each with its own.
 
         ``ninth``: one for all, or a 0 or 1 for each.
         """
         if not data:
+            return
+        if not self._waiting and self._ninth is None and len(data) <= CHUNK and self._free():
+            # Nearly always: a packet, all of it, and the line is free.
+            self._until = self._medium.transmit(self, data, self._lane).end
             return
         self._buffer += data
         if self._ninth is not None:
@@ -142,14 +143,12 @@ class Port:
             return
         medium = self._medium
         kernel = medium.kernel
-        now = kernel.now
-        if now != self._until:
+        if not self._free():
             free_at = medium.free_at(self._lane)
-            earliest = now if free_at is None else max(now, free_at + self._latency)
-            if earliest > now:
-                self._waiting = True
-                kernel.at(earliest, self._start)
-                return
+            assert free_at is not None  # somebody else has the line, or had it just now
+            self._waiting = True
+            kernel.at(free_at + self._latency, self._start)
+            return
         buffer = self._buffer
         chunk = bytes(buffer if len(buffer) <= CHUNK else buffer[:CHUNK])
         del buffer[:CHUNK]
@@ -163,6 +162,14 @@ class Port:
         if self._buffer:
             self._waiting = True
             kernel.at(self._until, self._start)
+
+    def _free(self) -> bool:
+        """Whether the port may begin to send now: right behind its own bytes, or on a free line."""
+        now = self._medium.kernel.now
+        if now <= self._until:
+            return now == self._until
+        free_at = self._medium.free_at(self._lane)
+        return free_at is None or free_at + self._latency <= now
 
     def _flow(self, *, held: bool) -> None:
         if held != self._held and self._hold is not None:

@@ -208,7 +208,7 @@ class PtyLink:
         data = self._pair.read()
         if data is None:
             self._everybody_left(self._pair)
-        else:
+        elif data:
             self._hand_on(data)
 
     def _hand_on(self, data: bytes) -> None:

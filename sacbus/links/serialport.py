@@ -137,6 +137,8 @@ class SerialConnection(asyncio.Protocol):
         self._marking: asyncio.Future[None] | None = None
         self._failing = False
         self._ended = False
+        #: Whether the transport may hold bytes that the system has not taken; its count is dear.
+        self._kept = False
         #: Bytes that the port had not taken when it was lost.
         self.lost_unwritten = 0
         self.port: Final = _Port()
@@ -163,13 +165,18 @@ class SerialConnection(asyncio.Protocol):
         """
         if self._ended or self._failing or self._transport.is_closing():
             return 0
+        unwritten = self._unwritten if self._kept else 0
         taken = 0
-        if sys.platform != "win32" and not self._unwritten:
+        if sys.platform != "win32" and not unwritten:
             # At once, not at the loop's next turn: that is a third of what a reply costs.
             taken = self.port.write(data)
-        rest = data[taken : taken + BOUND - self._unwritten]
+            if taken == len(data):
+                self._kept = False
+                return taken
+        rest = data[taken : taken + BOUND - unwritten]
         if rest:
             self._transport.write(rest)
+            self._kept = True
         return taken + len(rest)
 
     def check_marking(self) -> None:

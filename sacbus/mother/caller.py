@@ -1,8 +1,9 @@
 """Transactions: one request at a time on a half-duplex line, and what becomes of it.
 
-Owns whose turn it is, when an answer is overdue, what may be asked again, the pause after each
-packet, and what an emergency stop does to those who wait. Synchronous; a clock is handed in (the
-kernel, or a loop's), bytes go out through a callable and come in through :meth:`Caller.hear`.
+Owns whose turn it is, what may be asked again, the pause after each packet, and what an emergency
+stop does to those who wait; when an answer is overdue is ``overdue.py``'s business. Synchronous; a
+clock is handed in (the kernel, or a loop's), bytes go out through a callable and come in through
+:meth:`Caller.hear`.
 Source: spec, mother ("Transactions", "Safety").
 """
 
@@ -18,8 +19,9 @@ from sacbus.mother.clock import Clock
 from sacbus.mother.errors import LineLost, MotherError
 from sacbus.mother.estop import EmergencyStop
 from sacbus.mother.outcome import Acknowledged, Done, Sent
+from sacbus.mother.overdue import Overdue
 from sacbus.mother.pending import Pending
-from sacbus.mother.request import checked_address, safe_body
+from sacbus.mother.request import checked_address, safe_packet
 from sacbus.mother.soft_ops import SoftOpHeard, soft_op
 from sacbus.mother.statistics import NodeStatistics
 from sacbus.wire import (
@@ -31,19 +33,13 @@ from sacbus.wire import (
     PacketReceiver,
     encode,
 )
-from sacbus.wire.times import ANSWER_BYTES, MOTHER_GAP, turnaround
+from sacbus.wire.times import MOTHER_GAP
 
 __all__ = ["SLACK", "TRIES", "Caller"]
 
 #: How long an answer may be late beyond the line's own figures, on a line in this process, once
 #: the packet is out of the port: it covers what an answer may wait for besides its turnaround.
 SLACK: Final[Ns] = 10 * MS
-
-#: What makes a packet of a body: STX, two addresses, ETX, CRC, NUL.
-FRAME_BYTES: Final = 6
-
-#: The space that a body may need for its CRC.
-_PADDING: Final = 1
 
 #: Attempts for what may be repeated.
 TRIES: Final = 3
@@ -79,13 +75,9 @@ class Caller:
         self._receiver = PacketReceiver()
         self._waiting: deque[Pending] = deque()
         self._outstanding: Pending | None = None
-        #: When the outstanding request's answer is overdue, and for when the next look at it is
-        #: appointed. Nearly all answers come in time, and nearly all requests do with the
-        #: appointment of one before.
-        self._due: Ns = 0
-        self._look_at: Ns | None = None
-        #: When an answer is due by the line's own figures, after how long, by the body's size.
-        self._expected: dict[int, Ns] = {}
+        self._overdue = Overdue(
+            clock, self._rate, lambda: self._outstanding, self._silent, self._unsent
+        )
         #: Nodes that were given up before all of the slack was over, and when that is.
         self._unsettled: dict[int, Ns] = {}
         #: True while the pause after a packet lasts, or a broadcast is on its way.
@@ -94,7 +86,8 @@ class Caller:
         #: The emergency stop that is under way, and who waits for its end.
         self._stop: EmergencyStop | None = None
         self._stopping: list[Done] = []
-        self._lost: LineLost | None = None
+        #: Why nothing can be sent any more; None while it can.
+        self.lost: LineLost | None = None
         self.statistics: defaultdict[int, NodeStatistics] = defaultdict(NodeStatistics)
         #: Packets of others, answers that nobody waits for, and line faults, counted.
         self.overheard = 0
@@ -121,19 +114,8 @@ class Caller:
         accepts that it may run twice; NAK always is, since a node that says NAK has not acted.
         :class:`BadRequest` at once for what cannot be sent.
         """
-        checked_address(node)
-        body = safe_body(line)
-        self._enqueue(
-            Pending(
-                node,
-                body,
-                encode(node, MOTHER, body),
-                done,
-                accept_duplicates,
-                self._tries,
-                self._slack,
-            )
-        )
+        body, data = safe_packet(checked_address(node), line)
+        self._enqueue(Pending(node, body, data, done, accept_duplicates, self._tries, self._slack))
 
     def probe(self, node: int, slack: Ns, done: Done) -> None:
         """Ask once, with the empty line, whether anybody is at ``node``, and wait ``slack`` only.
@@ -149,18 +131,8 @@ class Caller:
 
     def broadcast(self, line: bytes, done: Done) -> None:
         """Have everybody receive ``line``; nobody answers. ``done`` comes when the line is free."""
-        body = safe_body(line)
-        self._enqueue(
-            Pending(
-                GENERAL_CALL,
-                body,
-                encode(GENERAL_CALL, MOTHER, body),
-                done,
-                may_repeat=False,
-                tries=1,
-                slack=0,
-            )
-        )
+        body, data = safe_packet(GENERAL_CALL, line)
+        self._enqueue(Pending(GENERAL_CALL, body, data, done, may_repeat=False, tries=1, slack=0))
 
     def estop(self, done: Done) -> None:
         """Have everybody stop now: S at once and twice more, whatever is outstanding.
@@ -170,8 +142,8 @@ class Caller:
         outstanding ends as it does, but is not sent again. ``done`` comes when the line is free.
         What is asked from now on has its turn after that.
         """
-        if self._lost is not None:
-            done(self._lost)
+        if self.lost is not None:
+            done(self.lost)
             return
         self.stops += 1
         self._stopping.append(done)
@@ -220,27 +192,22 @@ class Caller:
                 if self.soft_op_listeners:
                     self._tell_soft_op(event)
 
-    @property
-    def lost(self) -> LineLost | None:
-        """Why nothing can be sent any more; None while it can."""
-        return self._lost
-
     def lose(self, why: str) -> None:
         """The line is gone: everything that waits fails, and so does all that is asked later."""
-        self._lost = LineLost(why)
+        self.lost = LineLost(why)
         waiting = [self._outstanding, self._broadcasting, *self._waiting]
         self._outstanding = self._broadcasting = None
         self._waiting.clear()
         if self._stop is not None:
             self._stop.end()
-        self._end_stop(self._lost)
+        self._end_stop(self.lost)
         for request in waiting:
             if request is not None:
-                request.done(self._lost)
+                request.done(self.lost)
 
     def _enqueue(self, request: Pending) -> None:
-        if self._lost is not None:
-            request.done(self._lost)
+        if self.lost is not None:
+            request.done(self.lost)
             return
         self._waiting.append(request)
         self._next()
@@ -248,9 +215,9 @@ class Caller:
     def _next(self) -> None:
         """Send the next request if the line is ours."""
         if (
-            self._outstanding is None
+            self._waiting
+            and self._outstanding is None
             and not self._pausing
-            and self._waiting
             and self._stop is None
             and not (self._unsettled and self._may_still_answer(self._waiting[0].node))
         ):
@@ -280,10 +247,7 @@ class Caller:
             clock.at(now + line_time + self._gap, self._broadcast_over)
         else:
             self._outstanding = request
-            self._due = now + self._patience(request)
-            if self._look_at is None or self._due < self._look_at:
-                self._look_at = self._due
-                clock.at(self._due, self._look)
+            self._overdue.mind(request, now)
         self._send(request.data)
 
     def _tell_soft_op(self, packet: Packet) -> None:
@@ -319,43 +283,13 @@ class Caller:
             self._pause()
             request.done(request.failure())
 
-    def _look(self) -> None:
-        """See whether the answer that we wait for is overdue."""
-        now = self._clock.now
-        if self._look_at is None or self._look_at > now:
-            return  # one that an earlier one has made needless
-        self._look_at = None
-        request = self._outstanding
-        if request is None:
-            return
-        if self._due <= now and self._unsent is not None and self._unsent():
-            self._due = now + self._patience(request)
-        if self._due > now:
-            # Another one than the look was for.
-            self._look_at = self._due
-            self._clock.at(self._due, self._look)
-        else:
-            self._silent(request)
-
     def longest_call(self, body: int) -> Ns:
         """How long a call may take once it is its turn, if every attempt but the last fails.
 
         For a line of ``body`` bytes; on a line that takes at once what it is given.
         """
-        attempt = self._line_time(body + _PADDING) + self._slack + self._gap
+        attempt = self._overdue.line_time(body) + self._slack + self._gap
         return self._gap + self._tries * attempt
-
-    def _patience(self, request: Pending) -> Ns:
-        """How long an answer may take, from the packet's first bit on."""
-        return self._line_time(len(request.body)) + request.slack
-
-    def _line_time(self, body: int) -> Ns:
-        """From the first bit of a packet to the last of its answer, by the line's own figures."""
-        known = self._expected.get(body)
-        if known is None:
-            answer = turnaround(body, nul_follows=True) + self._rate.span(ANSWER_BYTES)
-            known = self._expected[body] = self._rate.span(body + FRAME_BYTES) + answer
-        return known
 
     def _silent(self, request: Pending) -> None:
         self._outstanding = None

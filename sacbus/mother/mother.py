@@ -10,7 +10,7 @@ import asyncio
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from sacbus.kernel import MS, LineRate, Ns
 from sacbus.language.line import quoted, short
@@ -34,6 +34,8 @@ __all__ = ["LINK_SLACK", "Mother", "addressed_line"]
 #: How late an answer may be on a link out of this process: a USB adapter's 16 ms latency timer
 #: both ways, and a busy machine.
 LINK_SLACK: Final[Ns] = 100 * MS
+
+_Good = TypeVar("_Good", Acknowledged, Sent)
 
 _ADDRESSED: Final = re.compile(r"0*([0-9]+)(.*)", re.DOTALL)
 
@@ -93,7 +95,7 @@ class Mother:
                 gap=gap,
                 set_dtr=line.set_dtr,
             )
-            line.start(mother.hear, mother.lose)
+            line.start(mother.caller.hear, mother.lose)
             try:
                 yield mother
             finally:
@@ -152,15 +154,19 @@ class Mother:
         lets a command that is not idempotent be sent again after silence; it may then run twice. A
         cancelled call whose turn has not come is never sent; one that is out is not sent again.
         """
-        return await self._acknowledged(
+        return await self._outcome(
             lambda done: self._caller.call(
-                node, _bytes(line), done, accept_duplicates=accept_duplicates
-            )
+                node,
+                line if type(line) is bytes else _bytes(line),
+                done,
+                accept_duplicates=accept_duplicates,
+            ),
+            Acknowledged,
         )
 
     async def broadcast(self, line: str | bytes) -> None:
         """Send a line to all nodes; returns when the next packet may follow. Nobody answers."""
-        await self._outcome(lambda done: self._caller.broadcast(_bytes(line), done))
+        await self._outcome(lambda done: self._caller.broadcast(_bytes(line), done), Sent)
 
     def set_dtr(self, *, asserted: bool) -> None:
         """Set DTR, an output of a serial adapter that RS485 leaves to other uses, now.
@@ -205,7 +211,7 @@ class Mother:
         for sleeper in self._sleepers:
             if not sleeper.done():
                 sleeper.set_exception(Stopped(0, ""))
-        await self._outcome(self._caller.estop)
+        await self._outcome(self._caller.estop, Sent)
 
     async def scan(
         self,
@@ -220,7 +226,9 @@ class Mother:
         how often a node had to be asked, ``round_trip`` is that of its answer. ``progress`` is
         called after each address. Other calls have their turns in between.
         """
-        return await scan(self._caller, self._acknowledged, addresses, progress)
+        return await scan(
+            self._caller, lambda ask: self._outcome(ask, Acknowledged), addresses, progress
+        )
 
     async def run(
         self,
@@ -240,14 +248,9 @@ class Mother:
 
         return await Stream(self, machine, progress=progress, halt=halt).run(blocks)
 
-    async def _acknowledged(self, ask: Callable[[Done], None]) -> Acknowledged:
-        outcome = await self._outcome(ask)
-        if not isinstance(outcome, Acknowledged):
-            raise TypeError(f"an addressed packet ended in {outcome!r}")
-        return outcome
-
-    async def _outcome(self, ask: Callable[[Done], None]) -> Acknowledged | Sent:
-        future: asyncio.Future[Acknowledged | Sent] = asyncio.get_running_loop().create_future()
+    async def _outcome(self, ask: Callable[[Done], None], good: type[_Good]) -> _Good:
+        """Have something asked, and wait for what becomes of it: ``good``, or a MotherError."""
+        future: asyncio.Future[Outcome] = asyncio.get_running_loop().create_future()
 
         def done(outcome: Outcome) -> None:
             if future.done():
@@ -262,10 +265,13 @@ class Mother:
             raise self._caller.lost
         self._arrive(ask, done)
         try:
-            return await future
-        finally:
-            if future.cancelled():
-                self._caller.withdraw(done)
+            outcome = await future
+        except asyncio.CancelledError:
+            self._caller.withdraw(done)
+            raise
+        if type(outcome) is not good:
+            raise TypeError(f"expected the outcome to be {good.__name__}, got {outcome!r}")
+        return outcome
 
 
 def addressed_line(text: str) -> tuple[int, str]:

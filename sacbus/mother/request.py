@@ -12,9 +12,9 @@ from typing import Final
 
 from sacbus.language.line import quoted
 from sacbus.mother.errors import BadRequest
-from sacbus.wire import ACK, ETX, MAX_BODY, NUL, STX, crc8
+from sacbus.wire import ACK, ETX, MAX_BODY, MOTHER, NUL, STX, encode
 
-__all__ = ["SPEAKS", "checked_address", "safe_body"]
+__all__ = ["SPEAKS", "checked_address", "safe_body", "safe_packet"]
 
 #: The protocol of what mother sends, as a bus calls it.
 SPEAKS: Final = "sac"
@@ -25,6 +25,9 @@ _UNSAFE_CRCS: Final = frozenset((NUL, STX, ETX))
 _UNSAFE_BYTES: Final = {NUL: "NUL", STX: "STX", ETX: "ETX", ACK: "ACK"}
 _UNSAFE: Final = re.compile(b"[%b]" % bytes(_UNSAFE_BYTES)).search
 
+#: Where in a packet its CRC stands, before the NUL.
+_CRC: Final = -2
+
 
 def safe_body(body: bytes) -> bytes:
     """``body``, with a trailing space if it needs one for a CRC that every device checks.
@@ -33,6 +36,11 @@ def safe_body(body: bytes) -> bytes:
     is left alone (its CRC is 00, and a space would make it a message). :class:`BadRequest` for
     bytes 00, 02, 03 and 06, and for what is longer than 46 with its spaces.
     """
+    return safe_packet(MOTHER, body)[0]
+
+
+def safe_packet(node: int, body: bytes) -> tuple[bytes, bytes]:
+    """``body`` as :func:`safe_body` makes it, and the packet that takes it to ``node``, or all."""
     if (unsafe := _UNSAFE(body)) is not None:
         value = unsafe[0][0]
         raise BadRequest(
@@ -40,16 +48,18 @@ def safe_body(body: bytes) -> bytes:
             "would end or break the packet; leave it out"
         )
     sent = body
-    if crc8(body) in _UNSAFE_CRCS and body:
+    packet = encode(node, MOTHER, body)
+    if packet[_CRC] in _UNSAFE_CRCS and body:
         # One always cures: a space after a body turns its CRC from 00, 02, 03 into 23, 9F, C1.
         sent += b" "
+        packet = encode(node, MOTHER, sent)
     if len(sent) > MAX_BODY:
         needs = " and a trailing space for its CRC" if len(sent) > len(body) else ""
         raise BadRequest(
             f"line {quoted(body.decode('latin-1'))}: expected at most {MAX_BODY} characters, got "
             f"{len(body)}{needs}; split it"
         )
-    return sent
+    return sent, packet
 
 
 def checked_address(node: object) -> int:

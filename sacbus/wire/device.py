@@ -61,10 +61,12 @@ class DeviceReceiver:
     event.
     """
 
-    __slots__ = ("_address", "_held", "_search")
+    __slots__ = ("_address", "_held", "_search", "open")
 
     def __init__(self, address: int) -> None:
         self._held = b""
+        #: False exactly when a byte other than STX could change nothing: nothing is held.
+        self.open = False
         self.address = address
 
     @property
@@ -83,18 +85,13 @@ class DeviceReceiver:
         self._address = address
         self._search = _events_at(address).search
 
-    @property
-    def open(self) -> bool:
-        """False exactly when a byte other than STX could change nothing."""
-        return bool(self._held)
-
     def receive(self, data: bytes, start: int = 0) -> tuple[Heard, int] | None:
         """The first event that data[start:] completes, and the index after its trigger byte.
 
         Call again with that index, or a later one, for the rest. None when all is consumed and
         nothing happened.
         """
-        if self._held:
+        if self.open:
             return self._resume(data, start)
         found = self._search(data, start)
         if found is not None:
@@ -107,6 +104,7 @@ class DeviceReceiver:
     def _resume(self, data: bytes, start: int) -> tuple[Heard, int] | None:
         """`receive`, with an unfinished stretch held."""
         held, self._held = self._held, b""
+        self.open = False
         stream = held + data[start:]
         # A destination that was accepted stays so, even if the address has changed since.
         accepted = len(held) > 1
@@ -126,6 +124,7 @@ class DeviceReceiver:
     def _hold(self, stretch: bytes) -> None:
         """Keep an unfinished stretch, shortened to what its end can depend on."""
         self._held = stretch[:2] + _ETX_RUN.sub(b"\x03", stretch[2:])
+        self.open = True
 
 
 def _event(found: re.Match[bytes]) -> Heard:

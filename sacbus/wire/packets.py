@@ -106,7 +106,8 @@ def encode(dest: int, src: int, body: bytes, *, crc: bool = True) -> bytes:
     this wire is escaped, and which bodies, bytes and addresses a device would lose is the sender's
     matter.
     """
-    _check_addresses(dest, src)
+    if not (0 <= dest <= 255 and 0 <= src <= 255):
+        raise _no_addresses(dest, src)
     if crc:
         return b"\x02%c%c%b\x03%c\x00" % (dest, src, body, table_crc(body, 0, CRC_TABLE))
     return b"\x02%c%c%b\x03\x00" % (dest, src, body)
@@ -114,17 +115,17 @@ def encode(dest: int, src: int, body: bytes, *, crc: bool = True) -> bytes:
 
 def ack(dest: int, src: int) -> bytes:
     """The four bytes by which src accepts a packet of dest; ValueError as for `encode`."""
-    _check_addresses(dest, src)
-    return bytes((STX, dest, src, ACK))
+    if not (0 <= dest <= 255 and 0 <= src <= 255):
+        raise _no_addresses(dest, src)
+    return b"\x02%c%c\x06" % (dest, src)
 
 
 def nak(dest: int, src: int) -> bytes:
     """The four bytes by which src refuses a packet of dest; ValueError as for `encode`."""
-    _check_addresses(dest, src)
-    return bytes((STX, dest, src, NAK))
-
-
-def _check_addresses(dest: int, src: int) -> None:
     if not (0 <= dest <= 255 and 0 <= src <= 255):
-        message = f"addresses are one byte, 0 to 255: got dest {dest}, src {src}"
-        raise ValueError(message)
+        raise _no_addresses(dest, src)
+    return b"\x02%c%c\x15" % (dest, src)
+
+
+def _no_addresses(dest: int, src: int) -> ValueError:
+    return ValueError(f"addresses are one byte, 0 to 255: got dest {dest}, src {src}")

@@ -66,7 +66,7 @@ def test_two_nodes_of_one_address_both_answer_and_spoil_each_others_answer() -> 
 
 def test_a_node_that_was_driven_from_outside_is_asked_anew_when_it_wants_to_be_woken() -> None:
     bench = Bench()
-    bench.node._network.send(MOTHER, b" hi", 5 * MS)
+    bench.node.board.network.send(MOTHER, b" hi", 5 * MS)
     bench.run()
     assert bench.heard == []
     bench.bus.touch(bench.node)
@@ -279,7 +279,7 @@ def test_an_answer_is_punctual_and_the_end_of_a_motion_is_quiet() -> None:
     bench = Bench()
     bench.port.close()
     bench.hears(MOVE, at=20 * MS)
-    answer, end = bench.node._network.due, bench.node._commands.due
+    answer, end = bench.node.board.network.due, bench.node.board.commands.due
     assert answer is not None
     assert due(bench) == (answer, answer)
     # The answer ends on the line, which is punctual as well.
@@ -294,7 +294,7 @@ def test_where_soft_ops_tell_of_it_the_end_of_a_motion_is_punctual() -> None:
     bench = Bench(settings=SacSettings(soft_ops=True))
     bench.hears(MOVE, at=20 * MS)
     bench.kernel.run_until(SECOND)
-    end = bench.node._commands.due
+    end = bench.node.board.commands.due
     assert due(bench) == (end, end)
 
 
@@ -306,13 +306,13 @@ def test_an_appointment_that_was_quiet_is_punctual_once_the_node_has_something_t
     bench = Bench()
     bench.hears(MOVE, at=20 * MS)
     bench.kernel.run_until(SECOND)
-    end = bench.node._commands.due
+    end = bench.node.board.commands.due
     assert end is not None
     assert due(bench) == (end, None)
     # 385 us for 5 characters, from the end of the NUL behind ETX (which `hears` does not send).
     bench.sends(packet("v100"), at=end + apart - 385 * US - bench.span(len(packet("v100"))))
     bench.kernel.run_until(end + apart - 350 * US)
-    answer = bench.node._network.due
+    answer = bench.node.board.network.due
     assert answer == end + apart
     assert bench.kernel.next_at() == min(end, answer)
     # Were the end late, so would be what the node wants after it.

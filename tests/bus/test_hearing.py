@@ -96,7 +96,7 @@ def test_beyond_a_cut_nodes_hear_each_other_and_nobody_else() -> None:
     say(bench, GENERAL_CALL)
     assert moved(bench) == [MOVED, 0, 0]
     assert list(passage(seen[0]).missed) == [11, 12]
-    bench.nodes[11].network.send(12, MOVE.encode(), bench.kernel.now)
+    bench.nodes[11].board.network.send(12, MOVE.encode(), bench.kernel.now)
     bench.bus.touch(bench.nodes[11])
     bench.run()
     assert moved(bench) == [MOVED, 0, MOVED]

@@ -32,7 +32,7 @@ def test_lines_come_through_both_ports_and_most_are_obeyed() -> None:
     world = World(2)
     packets = [0] * len(world.nodes)
     for _ in range(200):
-        before = [node.network for node in world.nodes]
+        before = [node.board.network for node in world.nodes]
         counted = [network.packets for network in before]
         world.go_on(20)
         for place, network in enumerate(before):

@@ -132,7 +132,7 @@ class World:
         To a node that answers nothing several in a row, since no answer comes between.
         """
         node = self.nodes[place]
-        count = 1 if node.network.ack else 1 + int(self._rng.random() * 8)
+        count = 1 if node.board.network.ack else 1 + int(self._rng.random() * 8)
         self._talk("packets", place, b"".join([self._packet(node) for _ in range(count)]), count)
 
     def _packet(self, node: SacNode) -> bytes:
@@ -221,7 +221,7 @@ class World:
         rng = self._rng
         chosen = int(rng.random() * len(self.nodes))
         for place, node in enumerate(self.nodes):
-            memory = node.obeyed
+            memory = node.board.obeyed
             lost = memory.network or memory.sw != RATE.baud or node.address != _FIRST + place
             if not lost and place != chosen:
                 continue

@@ -15,6 +15,7 @@ from random import Random
 from typing import Final
 
 from nodes.sac import SacNode, SacSettings
+from nodes.sac.board import SacBoard
 from nodes.sac.protocol import SAC_PROTOCOL
 from sacbus.bus import Bus, Dead, Fault, FaultOn, Port
 from sacbus.configuration import Configuration, NodeAt
@@ -91,15 +92,15 @@ class Run:
         )
 
 
-class Witness(SacNode):
-    """A SAC that keeps account of what it accepts from the line: when, who, what."""
+class Witness(SacBoard):
+    """The parts of a SAC, which keeps account of what it accepts from the line: when, who, what."""
 
     __slots__ = ("account",)
 
     account: list[tuple[Ns, int, bytes]]
 
     def network_line(self, body: bytes, source: int, destination: int, now: Ns) -> None:
-        self.account.append((now, self.address, body))
+        self.account.append((now, self.network.address, body))
         super().network_line(body, source, destination, now)
 
 
@@ -116,8 +117,10 @@ class Ordeal:
         self._random = Random(seed)
         self._requests = self._lines(count)
         for address in ADDRESSES:
-            node = Witness(address, SacSettings(acc=ACC, dec=ACC), self.bus.rate, self.bus.tell)
-            node.account = self.account
+            made = address, SacSettings(acc=ACC, dec=ACC), self.bus.rate, self.bus.tell
+            node = SacNode(*made)
+            node.board = witness = Witness(*made)
+            witness.account = self.account
             self.bus.add(node)
         port = Port(self.bus.medium, lambda heard, _: self.caller.hear(heard.data), latency=0)
         port.name = "mother"

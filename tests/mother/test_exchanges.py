@@ -36,7 +36,7 @@ class Rig:
         #: What happens to the next messages instead of their being sent.
         self.weather: list[str] = []
         self.exchanges = Exchanges(self.bench.kernel, self.talk, self.bench.bus.rate)
-        self.bench.port._hear = lambda heard, _now: self.exchanges.hear(heard.data)
+        self.bench.port.hear = lambda heard, _now: self.exchanges.hear(heard.data)
 
     def talk(self, data: bytes, ninth: bytes) -> None:
         self.sent.append((data, ninth))

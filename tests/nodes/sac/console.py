@@ -36,7 +36,7 @@ class Console:
     @property
     def mode(self) -> Mode:
         """The mode that the terminal is in."""
-        terminal = self.bench.node.terminal_port
+        terminal = self.bench.node.board.terminal_port
         assert terminal is not None
         return terminal.mode
 

@@ -11,12 +11,14 @@ Positions are microsteps; pulses are the same in number, but with auto-micro.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from nodes.sac import SacNode
+from nodes.sac import SacNode, SacSettings
+from nodes.sac.board import SacBoard
 from nodes.sac.order import Source
 from nodes.sac.ports import understand
-from sacbus.kernel import Ns
+from sacbus.kernel import LineRate, Ns
 from sacbus.language import (
     QUEUE_LENGTH,
     Acceleration,
@@ -55,13 +57,14 @@ from sacbus.language import (
     seeded_row,
 )
 from sacbus.motion import Profile
+from sacbus.node import Report
 from sacbus.wire import DC1, DC2, GENERAL_CALL, NAK, STX, ack, encode
 
 __all__ = ["Ledger", "WatchedNode"]
 
 
-class WatchedNode(SacNode):
-    """A SAC that has its ledger know of each line it takes, before and after."""
+class WatchedBoard(SacBoard):
+    """The parts of a SAC, which has its ledger know of each line it takes, before and after."""
 
     ledger: Ledger
 
@@ -82,6 +85,22 @@ class WatchedNode(SacNode):
         before = ledger.before_line(parse_in(terminal.mode, line).command, now)
         super().line_typed(line, now)
         ledger.after_line(before, now)
+
+
+class WatchedNode(SacNode):
+    """A SAC with a board that is watched."""
+
+    board: WatchedBoard
+
+    def __init__(
+        self,
+        address: int,
+        settings: SacSettings,
+        rate: LineRate,
+        tell: Callable[[Report], None],
+        memory: Mapping[str, object] | None,
+    ) -> None:
+        self.board = WatchedBoard(address, settings, rate, tell, memory)
 
 
 @dataclass
@@ -145,7 +164,7 @@ class Ledger:
         self.astray_until: Ns = 0
         self._boot: object = None
         self._see_boot()
-        node.ledger = self
+        node.board.ledger = self
 
     # ---- time ----
 
@@ -165,7 +184,7 @@ class Ledger:
     def happened(self, now: Ns) -> None:
         """Events were due at ``now``: a command may have ended, and the next one been taken."""
         self._look(now)
-        commands = self.node.commands
+        commands = self.node.board.commands
         pending = tuple(commands.queue.pending)
         if pending != self.pending:
             assert pending == self.pending[1:], "not the command whose turn it was"
@@ -192,7 +211,7 @@ class Ledger:
 
     def stands(self) -> None:
         """All has been stopped just now: nothing runs, waits, or is to come."""
-        commands = self.node.commands
+        commands = self.node.board.commands
         assert commands.current is None
         assert commands.held is None
         assert not commands.pending
@@ -206,19 +225,20 @@ class Ledger:
     def turned(self, now: Ns) -> None:
         """The encoder has been turned, by a quarter at most: that may be a single pulse."""
         moved = self._where(now)[1] - self.position[1]
-        if moved in (-1, 1) and not self.node.throttles and self.node.booted:
+        if moved in (-1, 1) and not self.node.board.throttles and self.node.board.booted:
             self.may_step(moved)
         self.acted(now)
 
     def _where(self, now: Ns) -> tuple[int, int]:
         snapshot = self.node.snapshot(now)
-        return round(snapshot.position_steps * 2**self.node.obeyed.ustep), snapshot.position_pulses
+        per_step = 2**self.node.board.obeyed.ustep
+        return round(snapshot.position_steps * per_step), snapshot.position_pulses
 
     def _look(self, now: Ns) -> None:
         """See whether what runs is still what ran."""
         self._see_boot()
-        run, engine = self.run, self.node.engine
-        profile, motion = engine.profile, self.node.commands.current
+        run, engine = self.run, self.node.board.engine
+        profile, motion = engine.profile, self.node.board.commands.current
         if run is not None and run.profile is profile:
             run.started = engine.started
         elif (
@@ -250,19 +270,19 @@ class Ledger:
 
     def _check(self, now: Ns) -> None:
         """What holds at any time."""
-        commands = self.node.commands
+        commands = self.node.board.commands
         queue = commands.queue
         assert commands.session == self.session
         assert 1 <= queue.next_free <= QUEUE_LENGTH
         assert len(set(queue.pending)) == len(queue.pending) <= QUEUE_LENGTH
         assert commands.current is None or commands.held is None
-        assert (commands.current is None) is (self.node.engine.profile is None)
+        assert (commands.current is None) is (self.node.board.engine.profile is None)
         self.pending = tuple(queue.pending)
         self._see_whether_astray(now)
 
     def _see_boot(self) -> None:
         """A cold boot, or a factory restore, begins everything anew."""
-        commands = self.node.commands
+        commands = self.node.board.commands
         if commands is self._boot:
             return
         self._boot = commands
@@ -274,7 +294,7 @@ class Ledger:
 
     def _begin_session(self) -> None:
         """The settings of the session are the memory's."""
-        memory = self.node.eeprom
+        memory = self.node.board.eeprom
         self.session = Session.start(memory.defaults())
         self.soft_ops, self.acks, self.crcs = memory.soft_ops, memory.ack, memory.crc
 
@@ -283,7 +303,7 @@ class Ledger:
     def before_line(self, command: Command | None, now: Ns) -> Before:
         """A line is about to be obeyed."""
         self.happened(now)
-        commands = self.node.commands
+        commands = self.node.board.commands
         queue = commands.queue
         endless = isinstance(command, Move) and not command.steps
         if endless or isinstance(command, Stop | Next | RunPosition | ThrowAway | SystemCommand):
@@ -299,7 +319,7 @@ class Ledger:
             self._boot,
             idle,
             self.estop_is_low,
-            self.node.obeyed.ustep,
+            self.node.board.obeyed.ustep,
             queue.rows(),
             queue.next_free,
             self.pending,
@@ -309,10 +329,10 @@ class Ledger:
         """It has been obeyed: hold session, queue and motor against what it says."""
         command = before.command
         moved = self._expect_session(command)
-        commands = self.node.commands
+        commands = self.node.board.commands
         if isinstance(command, Reboot):
             self._count_in_other_microsteps(before.ustep, now)
-        starts_now = isinstance(command, ReleaseSync) and self.node.engine.started == now
+        starts_now = isinstance(command, ReleaseSync) and self.node.board.engine.started == now
         if not starts_now:
             assert self._where(now) == self.position, "a line has moved the motor at once"
         self._look(now)
@@ -326,7 +346,7 @@ class Ledger:
     def _count_in_other_microsteps(self, ustep: int, now: Ns) -> None:
         """The motor stands where it stood, or on the nearest of its new microsteps."""
         place, pulses = self._where(now)
-        moved = abs((place << ustep) - (self.position[0] << self.node.obeyed.ustep))
+        moved = abs((place << ustep) - (self.position[0] << self.node.board.obeyed.ustep))
         assert 2 * moved <= 1 << ustep
         assert pulses == self.position[1]
         self.position = (place, pulses)
@@ -366,7 +386,7 @@ class Ledger:
 
     def _check_rows(self, before: Before, moved: Motion | None) -> None:
         """The queue's positions after a line, from those before it."""
-        queue, session = self.node.commands.queue, self.session
+        queue, session = self.node.board.commands.queue, self.session
         rows, next_free = list(before.rows), before.next_free
         match before.command:
             case Move() if moved is not None:
@@ -378,7 +398,7 @@ class Ledger:
                 rows, next_free = [cleared_row(session)] * QUEUE_LENGTH, 1
             case RestoreQueue():
                 seeded = (seeded_row(session.defaults),) * QUEUE_LENGTH
-                rows, next_free = list(self.node.eeprom.queue or seeded), 1
+                rows, next_free = list(self.node.board.eeprom.queue or seeded), 1
             case Undo():
                 changed = [new for old, new in zip(rows, queue.rows(), strict=True) if old != new]
                 assert len(changed) <= 1
@@ -418,5 +438,5 @@ class Ledger:
 
     def _see_whether_astray(self, now: Ns) -> None:
         node = self.node
-        if node.obeyed.network or not understand(node.obeyed.sw, self._baud):
+        if node.board.obeyed.network or not understand(node.board.obeyed.sw, self._baud):
             self.astray_until = now

@@ -93,7 +93,7 @@ def test_a_packet_that_began_within_the_second_is_lost() -> None:
     bench.hears("v200", at=LISTENS + AT)
     bench.run()
     assert bench.answers == [ack(1, NODE)]
-    assert bench.node.commands.session.rpm == 200
+    assert bench.node.board.commands.session.rpm == 200
 
 
 def test_power_brings_the_version_line_and_a_second_later_the_prompt() -> None:
@@ -107,19 +107,19 @@ def test_power_brings_the_version_line_and_a_second_later_the_prompt() -> None:
 @pytest.mark.parametrize("key", ["x", "\r", " ", "m2000\r"])
 def test_a_key_within_the_second_restores_the_factory_s_memory(key: str) -> None:
     panel = Panel(SacSettings(ustep=2))
-    born = panel.node.eeprom
+    born = panel.node.board.eeprom
     panel.hears("$CM99", "$Cb5000", "$CU21", "q3m-500", "qs")
     changes: list[object] = []
-    panel.node.memory_changed = lambda: changes.append(panel.node.eeprom)
+    panel.node.memory_changed = lambda: changes.append(panel.node.board.eeprom)
     panel.cycles_power()
     panel.waits(LISTENS // 2)
     assert panel.types(key) == ""
     assert changes == []
     panel.waits(LISTENS)
-    assert panel.node.eeprom == born
+    assert panel.node.board.eeprom == born
     assert changes == [born]
-    assert panel.node.commands.queue.row(3).steps == 200
-    assert (panel.node.address, panel.node.commands.session.cycle_us) == (NODE, 3000)
+    assert panel.node.board.commands.queue.row(3).steps == 200
+    assert (panel.node.address, panel.node.board.commands.session.cycle_us) == (NODE, 3000)
     # It was no line: nothing of it is left to be executed.
     assert panel.types("vd\r") == "vd\r\n100 RPM  cycle 3000\r\nSAC>"
     assert panel.state() == "STANDBY"
@@ -131,7 +131,7 @@ def test_a_key_after_the_second_is_an_ordinary_one() -> None:
     panel.cycles_power()
     panel.waits(LISTENS)
     assert panel.types("v") == "v"
-    assert panel.node.eeprom.cycle == 5000
+    assert panel.node.board.eeprom.cycle == 5000
 
 
 def test_the_network_restores_nothing() -> None:
@@ -140,7 +140,7 @@ def test_the_network_restores_nothing() -> None:
     panel.cycles_power()
     panel.hears("x")
     panel.waits(LISTENS)
-    assert panel.node.eeprom.cycle == 5000
+    assert panel.node.board.eeprom.cycle == 5000
 
 
 @pytest.mark.parametrize(("rst", "cycle"), [(0, 3000), (1, 5000)])
@@ -149,11 +149,11 @@ def test_rst_restores_when_it_is_low_at_a_cold_boot(rst: int, cycle: int) -> Non
     panel.hears("$Cb5000", "qs")
     panel.node.pins.drive("rst", rst, panel.now)
     panel.hears("$R")
-    assert panel.node.eeprom.cycle == 5000
+    assert panel.node.board.eeprom.cycle == 5000
     panel.cycles_power()
     panel.waits(LISTENS)
-    assert panel.node.eeprom.cycle == panel.node.commands.session.cycle_us == cycle
-    assert (panel.node.eeprom.queue is None) is (rst == 0)
+    assert panel.node.board.eeprom.cycle == panel.node.board.commands.session.cycle_us == cycle
+    assert (panel.node.board.eeprom.queue is None) is (rst == 0)
 
 
 def test_what_the_factory_restores_is_found_on_the_bus() -> None:
@@ -180,7 +180,7 @@ def test_without_power_nothing_moves_and_nothing_is_heard_or_said() -> None:
     assert not panel.obeys()
     assert panel.types("m200\r") == ""
     panel.hears("m200")
-    assert panel.node.commands.current is None
+    assert panel.node.board.commands.current is None
     assert panel.bench.position(panel.now + SECOND) == position
     assert panel.bench.answers == []
 
@@ -191,7 +191,7 @@ def test_power_takes_all_but_the_eeprom() -> None:
     assert panel.bench.position(panel.now) > 0
     panel.cycles_power()
     panel.waits(LISTENS)
-    commands = panel.node.commands
+    commands = panel.node.board.commands
     assert panel.bench.position(panel.now) == 0
     assert (commands.session.cycle_us, commands.gap, commands.references) == (5000, True, ())
     assert [commands.queue.row(position).steps for position in (1, 2)] == [5, 200]
@@ -220,8 +220,8 @@ def test_a_warm_boot_shows_the_prompt_and_keeps_queue_and_position() -> None:
     panel.hears("$R")
     assert panel.shown == b"SAC>"
     assert panel.bench.position(panel.now) == 10
-    assert [panel.node.commands.queue.row(position).steps for position in (1, 5)] == [10, 7]
-    assert panel.node.commands.queue.next_free == 2
+    assert [panel.node.board.commands.queue.row(position).steps for position in (1, 5)] == [10, 7]
+    assert panel.node.board.commands.queue.next_free == 2
 
 
 def test_a_warm_boot_from_the_terminal_shows_one_prompt_and_the_lines_behind_it_are_obeyed() -> (
@@ -229,7 +229,7 @@ def test_a_warm_boot_from_the_terminal_shows_one_prompt_and_the_lines_behind_it_
 ):
     panel = Panel()
     assert panel.types("$CM99\r$R\rm300v60\r").count("SAC>") == 3
-    assert panel.node.commands.current is not None
+    assert panel.node.board.commands.current is not None
     assert panel.bench.bus.node(99) is panel.node
 
 
@@ -248,7 +248,7 @@ def visits(panel: Panel, count: int) -> list[int | None]:
     found: list[int | None] = []
     while len(found) < count:
         panel.waits(1 * MS)
-        current = panel.node.commands.current
+        current = panel.node.board.commands.current
         steps = None if current is None else current.steps
         if not found or found[-1] != steps:
             found.append(steps)
@@ -313,7 +313,7 @@ def test_what_was_restored_by_the_factory_runs_nothing() -> None:
     panel.types(" ")
     panel.waits(2 * LISTENS)
     assert panel.state() == "STANDBY"
-    assert panel.node.eeprom.value(Parameter.AUTORUN) == 0
+    assert panel.node.board.eeprom.value(Parameter.AUTORUN) == 0
 
 
 def test_a_setting_counts_as_the_factory_s() -> None:
@@ -324,7 +324,7 @@ def test_a_setting_counts_as_the_factory_s() -> None:
     panel.cycles_power()
     panel.types("x")
     panel.waits(LISTENS)
-    assert (panel.node.eeprom.autorun, panel.node.eeprom.cycle) == (2, 5000)
+    assert (panel.node.board.eeprom.autorun, panel.node.board.eeprom.cycle) == (2, 5000)
 
 
 def test_a_factory_restore_is_told() -> None:

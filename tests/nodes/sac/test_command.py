@@ -60,7 +60,7 @@ def periods(times: list[Ns]) -> list[Ns]:
 def command(bench: Bench, line: str, at: Ns) -> None:
     """A line straight into the node, at a time when no packet could bring it."""
     bench.kernel.run_until(at)
-    bench.node._messages.network_line(line.encode(), MOTHER, NODE, at)
+    bench.node.board.messages.network_line(line.encode(), MOTHER, NODE, at)
     bench.bus.touch(bench.node)
 
 
@@ -724,7 +724,7 @@ def test_a_stop_with_grace_that_has_no_ramp_leaves_nothing_either() -> None:
 
 def end_of_motion(bench: Bench) -> Ns:
     """When the command that runs will be over."""
-    end = bench.node._engine.end
+    end = bench.node.board.engine.end
     assert end is not None
     return end
 

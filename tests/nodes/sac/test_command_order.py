@@ -64,7 +64,7 @@ class Line:
 
     def _look(self) -> None:
         """Note the command that was to begin, if its time has come; then see what is to begin."""
-        engine = self.bench.node._engine
+        engine = self.bench.node.board.engine
         if self._next is not None and self._next[0] <= self.bench.kernel.now:
             self.ran.append(self._next[1])
             self._begun, self._next = self._next[0], None

@@ -53,7 +53,7 @@ def planned(capsys: pytest.CaptureFixture[str], loops: int) -> dict[str, Any]:
 
 def begun(bench: Bench) -> Iterator[tuple[Ns, Ns]]:
     """When each command of the node begins and ends."""
-    engine, last = bench.node._engine, None
+    engine, last = bench.node.board.engine, None
     while bench.kernel.run_next():
         if engine.profile is not None and engine.started != last:
             last = engine.started
@@ -73,7 +73,7 @@ def test_looped_by_la_its_commands_begin_and_end_as_planned(
         bench.kernel.run_until(bench.kernel.now + 50 * 1_000_000)
         bench.sends(packet(safe_body(edit(row).encode())), at=bench.kernel.now)
     bench.kernel.run_until(bench.kernel.now + SECOND)
-    assert list(bench.node._commands.queue.rows()) == [row.motion for row in rows()]
+    assert list(bench.node.board.commands.queue.rows()) == [row.motion for row in rows()]
     bench.hears(f"ln{loops}", at=bench.kernel.now + SECOND)
     bench.hears("la", at=bench.kernel.now + SECOND)
     times = list(begun(bench))

@@ -67,7 +67,7 @@ def packet_line(line: str) -> str:
 @given(st.binary(max_size=46))
 def test_no_line_whatsoever_is_refused_on_the_wire(body: bytes) -> None:
     bench = Bench()
-    bench.node._messages.network_line(body, MOTHER, NODE, 0)
+    bench.node.board.messages.network_line(body, MOTHER, NODE, 0)
     assert bench.node.snapshot(0).counters["nak"] == 0
     running = bench.node.snapshot(0).current
     for report in bench.told():

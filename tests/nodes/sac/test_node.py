@@ -157,11 +157,11 @@ def still_works(bench: Bench) -> None:
         assert bench.snapshot(at + MS, address).state == "STANDBY"
         bench.hears(f"m{number + 3}v10l0f", at=at + SECOND, to=address)
         bench.kernel.run_until(at + 300 * SECOND)
-        steps = (number + 3) * 2**made.eeprom.ustep
+        steps = (number + 3) * 2**made.board.eeprom.ustep
         assert bench.position(bench.kernel.now, address) == there + steps
         assert made.snapshot(0).counters["packets"] == count + 2
-        assert not made.receiving or made._settings.receiver == "robust"
-        if made._settings.ack:
+        assert not made.receiving or made.board.settings.receiver == "robust"
+        if made.board.settings.ack:
             assert bench.answers.count(ack(MOTHER, address)) >= 2
 
 

@@ -52,7 +52,7 @@ def test_a_node_has_no_pins_until_somebody_asks_for_them() -> None:
     bench = Bench()
     bench.hears("m5v10", at=AT)
     bench.run()
-    assert bench.node._pins is None
+    assert bench.node.board._pins is None
 
 
 def test_every_pin_has_a_level_and_open_inputs_are_pulled_up() -> None:

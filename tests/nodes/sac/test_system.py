@@ -56,7 +56,7 @@ class Desk:
         while self.bench.snapshot(self.bench.kernel.now).state == "STOP":
             self.bench.kernel.run_until(self.bench.kernel.now + 1 * US)
         began = self.bench.kernel.now
-        ends = self.node.commands.due
+        ends = self.node.board.commands.due
         assert ends is not None
         self.rests()
         return ends - began, self.bench.position(self.now) - before
@@ -86,9 +86,9 @@ def test_a_parameter_is_in_the_eeprom_at_once_and_obeyed_after_the_next_boot(
     if parameter.decimal and value > 10_000:
         value -= value % 100  # above 100 only whole numbers can be said
     desk = Desk()
-    born = desk.node.eeprom
+    born = desk.node.board.eeprom
     desk.hears(SetParameter(parameter, value).text())
-    assert desk.node.eeprom == born.with_values({parameter: value})
+    assert desk.node.board.eeprom == born.with_values({parameter: value})
     assert desk.node.address == NODE
     desk.hears("$R")
     assert desk.node.address == (value if parameter is Parameter.D_ID else NODE)
@@ -118,22 +118,24 @@ def test_what_saves_the_queue_or_is_none_lets_motion_go_on(line: str) -> None:
 
 def test_an_entry_of_the_pin_map_is_stored(desk: Desk) -> None:
     desk.hears(MapPins(2, 1).text())
-    assert desk.node.eeprom == replace(desk.node.eeprom, pins=(0, 1, 1, 3, 4, 5, 6, 7), d_id=NODE)
+    assert desk.node.board.eeprom == replace(
+        desk.node.board.eeprom, pins=(0, 1, 1, 3, 4, 5, 6, 7), d_id=NODE
+    )
 
 
 # ---- the queue ----------------------------------------------------------------------------------
 
 
 def rows(desk: Desk) -> tuple[Motion, ...]:
-    return desk.node.commands.queue.rows()
+    return desk.node.board.commands.queue.rows()
 
 
 def test_a_saved_queue_comes_back_and_nothing_of_it_is_pending(desk: Desk) -> None:
     desk.hears("q3m-500v50", "q30m7t9", "qs")
     saved = rows(desk)
     desk.hears("qc", "m5", "m6", "qr")
-    assert rows(desk) == saved == desk.node.eeprom.queue
-    assert desk.node.commands.pending == []
+    assert rows(desk) == saved == desk.node.board.eeprom.queue
+    assert desk.node.board.commands.pending == []
 
 
 def test_without_a_saved_queue_the_system_defaults_come_back(desk: Desk) -> None:
@@ -145,7 +147,7 @@ def test_clearing_the_queue_leaves_the_saved_one(desk: Desk) -> None:
     desk.hears("q3m-500v50", "qs")
     saved = rows(desk)
     desk.hears("qc")
-    assert desk.node.eeprom.queue == saved != rows(desk)
+    assert desk.node.board.eeprom.queue == saved != rows(desk)
 
 
 # ---- settings of the session --------------------------------------------------------------------
@@ -202,13 +204,13 @@ def test_answers_are_off_until_the_reboot_but_the_line_that_said_so_has_one(desk
 
 def test_a_ramp_comes_with_its_own_defaults_until_the_reboot(desk: Desk) -> None:
     desk.hears("$Cf2", "$Cg3", "$R", "$L1")
-    session = desk.node.commands.session
+    session = desk.node.board.commands.session
     assert (session.linear, session.acc100, session.dec100) == (True, 200, 300)
     desk.hears("$L0")
-    session = desk.node.commands.session
+    session = desk.node.board.commands.session
     assert (session.linear, session.acc100, session.dec100) == (False, 100, 100)
     desk.hears("$L1", "$R")
-    assert desk.node.commands.session.linear is False
+    assert desk.node.board.commands.session.linear is False
 
 
 def test_soft_ops_are_told_until_the_reboot(desk: Desk) -> None:
@@ -234,16 +236,16 @@ def test_soft_ops_are_told_until_the_reboot(desk: Desk) -> None:
 
 
 def test_the_encoder_changes_its_mode_until_the_reboot(desk: Desk) -> None:
-    modes = [desk.node.throttles]
+    modes = [desk.node.board.throttles]
     for line in ("$n", "$n", "$n", "$R"):
         desk.hears(line)
-        modes.append(desk.node.throttles)
+        modes.append(desk.node.board.throttles)
     assert modes == [False, True, False, True, False]
 
 
 def test_other_settings_of_the_session_are_gone_after_the_reboot(desk: Desk) -> None:
     desk.hears("v50", "a3", "b", "g", "$R")
-    commands = desk.node.commands
+    commands = desk.node.board.commands
     assert (commands.session.rpm, commands.session.acc100) == (100, 100)
     assert (commands.debug, commands.gap) == (False, True)
 
@@ -481,7 +483,7 @@ def test_rates_may_differ_by_two_and_a_half_per_cent(baud: int, understood: bool
 def test_a_node_is_born_with_the_rate_of_its_line() -> None:
     desk = Desk(rate=LineRate(9_600))
     assert desk.answered("v100") == [ack(1, NODE)]
-    assert desk.node.eeprom.sw == 9_600
+    assert desk.node.board.eeprom.sw == 9_600
     assert desk.bench.told() == []
     assert "sw" not in desk.node.persist()
     stored = {name_of(Parameter.SW): 38_400}
@@ -493,7 +495,7 @@ def test_load_times_are_as_after_power_came(desk: Desk) -> None:
     """The reboot forgets the last command: the next one loads its acceleration anew."""
     desk.runs("m1v100a999d999")
     desk.hears("m1v100a999d999")
-    assert desk.node.commands.due == desk.now + LOAD + 3 * MS
+    assert desk.node.board.commands.due == desk.now + LOAD + 3 * MS
     desk.rests()
     desk.hears("$R", "m1v100a999d999")
-    assert desk.node.commands.due == desk.now + LOAD_ACC + 3 * MS
+    assert desk.node.board.commands.due == desk.now + LOAD_ACC + 3 * MS

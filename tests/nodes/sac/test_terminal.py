@@ -90,7 +90,7 @@ def test_what_is_printed_while_nobody_is_there_is_lost(console: Console) -> None
 def test_a_node_has_no_port_before_somebody_asks_for_it() -> None:
     bench = Bench()
     bench.hears(" hello", at=20 * MS)
-    assert bench.node.terminal_port is None
+    assert bench.node.board.terminal_port is None
     terminal: Terminal = bench.node.terminal
     assert bench.node.terminal is terminal
 
@@ -447,7 +447,7 @@ def outcome(chunks: list[bytes]) -> object:
         console.terminal.type(chunk, 0)
     console.bench.bus.touch(console.bench.node)
     console.bench.kernel.run_until(5 * SECOND)
-    screens = [console.bench.node.answer(query) for query in (ShowQueue(), ShowSession())]
+    screens = [console.bench.node.board.answer(query) for query in (ShowQueue(), ShowSession())]
     return bytes(console.shown), console.bench.transcript(), screens
 
 
@@ -467,7 +467,7 @@ def test_nothing_that_is_typed_or_sent_raises(typed: list[bytes], sent: list[byt
         for line in typed[turn : turn + 1]:
             console.types(line)
         for body in sent[turn : turn + 1]:
-            node._messages.network_line(body, 7, NODE, console.bench.kernel.now)
+            node.board.messages.network_line(body, 7, NODE, console.bench.kernel.now)
             console.bench.bus.touch(node)
     assert console.types(b"\r\rX\r\r").endswith("SAC>")
     assert console.mode is Mode.PROMPT

@@ -60,7 +60,7 @@ def test_on_the_external_clock_no_edges_are_no_motion_and_that_is_told() -> None
     (warning,) = bench.told(ReportKind.WARNING)
     assert warning.text == "external clock: no edges come, so nothing moves before they do"
     assert bench.snapshot(10 * SECOND).position_pulses == 0
-    bench.node.feed_xclk(1_000_000, 10 * SECOND)
+    bench.node.board.feed_xclk(1_000_000, 10 * SECOND)
     bench.bus.touch(bench.node)
     assert bench.position(10 * SECOND + STEP) == 2
     bench.run()
@@ -74,7 +74,7 @@ def test_a_clock_that_stops_stops_the_motor_but_s_is_obeyed() -> None:
     bench = Bench(settings=SacSettings(clock=False, xclk_hz=1_000_000))
     bench.hears("m10v10", at=AT)
     bench.kernel.run_until(AT + LOAD_ACC + 3 * STEP)
-    bench.node.feed_xclk(0, bench.kernel.now)
+    bench.node.board.feed_xclk(0, bench.kernel.now)
     bench.bus.touch(bench.node)
     snapshot = bench.snapshot(SECOND)
     assert (snapshot.state, snapshot.position_pulses, snapshot.rpm) == ("CRUISE", 4, 0)
@@ -88,10 +88,10 @@ def test_a_command_that_waits_for_the_clock_begins_at_rest() -> None:
     bench.hears("m400v100a999d999", at=AT)
     bench.hears("m400v100a1d1s", at=AT + 20 * MS)
     bench.kernel.run_until(AT + LOAD_ACC + 1_200 * MS)
-    bench.node.feed_xclk(0, bench.kernel.now)
+    bench.node.board.feed_xclk(0, bench.kernel.now)
     bench.bus.touch(bench.node)
     bench.hears("y", at=2 * SECOND)
-    bench.node.feed_xclk(1_000_000, 3 * SECOND)
+    bench.node.board.feed_xclk(1_000_000, 3 * SECOND)
     bench.bus.touch(bench.node)
     assert bench.snapshot(3 * SECOND).rpm == 10
 
@@ -108,8 +108,8 @@ def test_a_cycle_takes_its_edges_whatever_their_frequency() -> None:
 def test_the_clock_at_xclk_is_of_no_matter_to_a_node_that_times_itself() -> None:
     bench = Bench()
     bench.hears("m10v10", at=AT)
-    bench.node.feed_xclk(0, AT)
-    bench.node.feed_xclk(123, AT + MS)
+    bench.node.board.feed_xclk(0, AT)
+    bench.node.board.feed_xclk(123, AT + MS)
     assert bench.position(AT + LOAD_ACC + STEP) == 2
 
 
