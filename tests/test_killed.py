@@ -47,7 +47,7 @@ async def saves():
     async with open_bus(Configuration(nodes=%(nodes)r, state=place)) as bus:
         say("ready", len(bus.bus.reports))
         nodes = list(bus.bus.nodes)
-        number = max(node.eeprom.cycle for node in nodes)
+        number = max(node.board.eeprom.cycle for node in nodes)
         while True:
             number += 1
             say("begins", number)
@@ -105,6 +105,7 @@ class Nursery:
 
     def _take_line(self, said: dict[str, int]) -> None:
         assert self._process.stdout is not None
+        assert "dead" not in said, f"a bus has ended by itself, wait status {said['dead']}"
         line = self._process.stdout.readline()
         assert line, "the nursery has ended"
         word, number = line.split()
