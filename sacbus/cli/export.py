@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, TextIO
 
 import click
 
-from sacbus.cli.options import WrongInput, read_addresses, verbose
+from sacbus.cli.options import STANDARD, WrongInput, read_addresses, verbose
 from sacbus.cli.recordings import (
-    STANDARD,
     fresh_or_standard,
     fresh_text,
     note_cut_off,

@@ -13,9 +13,8 @@ from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
 
 import click
 
-from sacbus.cli.options import read_parameters, verbose
+from sacbus.cli.options import STANDARD, read_parameters, verbose
 from sacbus.cli.recordings import (
-    STANDARD,
     fresh_text,
     picture_form,
     refuse_missing_directories,
