@@ -7,9 +7,11 @@ own no differently from a third party's. Synchronous; knows no protocol.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
 from typing import Final, NamedTuple
 from typing import Protocol as Contract
 
@@ -112,14 +114,23 @@ def find_master(protocol: str) -> MasterKind | None:
 
     BadRequest, naming it, for one that cannot be loaded.
     """
-    for entry in entry_points(group=GROUP):
-        if entry.name == protocol:
-            try:
-                kind: MasterKind = entry.load()
-            except Exception as fault:  # a third party's import may fail in any way
-                raise BadRequest(
-                    f"the master of {protocol!r} ({entry.value}) cannot be loaded: {fault!r}; "
-                    "mend or uninstall its package"
-                ) from fault
-            return kind
-    return None
+    entry = _installed(GROUP, tuple(sys.path)).get(protocol)
+    if entry is None:
+        return None
+    try:
+        kind: MasterKind = entry.load()
+    except Exception as fault:  # a third party's import may fail in any way
+        raise BadRequest(
+            f"the master of {protocol!r} ({entry.value}) cannot be loaded: {fault!r}; "
+            "mend or uninstall its package"
+        ) from fault
+    return kind
+
+
+@lru_cache(1)
+def _installed(group: str, _path: tuple[str, ...]) -> Mapping[str, EntryPoint]:
+    """The masters by protocol. All that is installed on a path is looked through once: 2 ms."""
+    found: dict[str, EntryPoint] = {}
+    for entry in entry_points(group=group):
+        found.setdefault(entry.name, entry)  # what stands first on the path
+    return found

@@ -38,8 +38,9 @@ _WARN: Final = (ReportKind.WARNING, ReportKind.REFUSED, ReportKind.OVERRUN)
 class Bench:
     """One bus under a scenario. Everything is called at the time of ``clock``.
 
-    ``talk`` puts bytes on the line as they are, ``say`` does so with ninth bits; ``unsent`` tells
-    how many of them wait for it. ``hosted`` is None where only the line is there.
+    ``talk`` puts bytes on the line as they are, ``say`` does so with ninth bits; ``unsent``, where
+    it can be known, tells how many of them wait for it. ``slack`` is the master's, for answers.
+    ``hosted`` is None where only the line is there.
     """
 
     def __init__(
@@ -47,20 +48,27 @@ class Bench:
         name: str,
         clock: Clock,
         protocol: Protocol,
+        rate: LineRate,
         talk: Callable[[bytes], None],
-        unsent: Callable[[], int],
-        span: Callable[[int], Ns],
         say: Callable[[bytes, bytes | None], None],
+        *,
+        slack: Ns | None = None,
+        unsent: Callable[[], int] | None = None,
     ) -> None:
         self.name = name
         self.clock = clock
         self.line = Line(protocol)
         self.talk = talk
         self.say = say
-        self.unsent = unsent
-        self.span = span
-        #: Who speaks to the nodes; None where no master of their protocol is installed.
+        self.span = rate.span
+        #: Who speaks to the nodes; None as long as nobody has been asked to.
         self.speaker: Master | None = None
+        self._protocol = protocol
+        self._rate = rate
+        self._slack = slack
+        self._unsent = unsent
+        #: Why the line is gone; None while it is there.
+        self._lost: str | None = None
         self.hosted: HostedBus | None = None
         self.look: Ns = LOOK
         #: By the addresses of the configuration, whatever a node is called by now.
@@ -78,9 +86,20 @@ class Bench:
 
     @property
     def master(self) -> Master:
-        """Who speaks to the nodes."""
-        assert self.speaker is not None, "the rules have looked for a master"
+        """Who speaks to the nodes: made when first asked for, since bytes alone take no master."""
+        if self.speaker is None:
+            kind = find_master(self._protocol.name)
+            assert kind is not None, "the rules have looked for a master"
+            self.speaker = kind.create(
+                self.clock, self.say, self._rate, slack=self._slack, unsent=self._unsent
+            )
+            if self._lost is not None:
+                self.speaker.lose(self._lost)
         return self.speaker
+
+    def unsent(self) -> int:
+        """How many bytes wait for the line; 0 where that cannot be known."""
+        return 0 if self._unsent is None else self._unsent()
 
     def hear(self, data: bytes) -> None:
         """The master hears what nodes say."""
@@ -89,6 +108,7 @@ class Bench:
 
     def lose(self, why: str) -> None:
         """The master's line is gone."""
+        self._lost = why
         if self.speaker is not None:
             self.speaker.lose(why)
 
@@ -155,10 +175,9 @@ def hosted_bench(hosted: HostedBus) -> Bench:
     def say(data: bytes, ninth: bytes | None) -> None:
         port.talk(data, 0 if ninth is None else ninth)
 
-    protocol, span = bus.protocol, bus.rate.span
-    bench = Bench(bus.name, kernel, protocol, port.talk, lambda: port.unsent, span, say)
-    if (kind := find_master(protocol.name)) is not None:
-        bench.speaker = kind.create(kernel, say, bus.rate, unsent=lambda: port.unsent)
+    bench = Bench(
+        bus.name, kernel, bus.protocol, bus.rate, port.talk, say, unsent=lambda: port.unsent
+    )
     _watch(bench, hosted)
     return bench
 
@@ -175,9 +194,7 @@ def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
         else:
             hosted.host.arrive(beside.talk, data, ninth)
 
-    bench = Bench(bus.name, kernel, bus.protocol, link.send, lambda: 0, bus.rate.span, say)
-    if (kind := find_master(bus.protocol.name)) is not None:
-        bench.speaker = kind.create(kernel, say, bus.rate, slack=slack)
+    bench = Bench(bus.name, kernel, bus.protocol, bus.rate, link.send, say, slack=slack)
     _watch(bench, hosted)
     link.start(
         lambda data: hosted.host.arrive(bench.hear, data),
@@ -213,9 +230,7 @@ def far_bench(
             link.send_marked(data, ninth)
             said(data, ninth)
 
-    bench = Bench(name, clock, protocol, send, lambda: 0, rate.span, say)
-    if (kind := find_master(protocol.name)) is not None:
-        bench.speaker = kind.create(clock, say, rate, slack=slack)
+    bench = Bench(name, clock, protocol, rate, send, say, slack=slack)
     link.start(hear, bench.lose)
     return bench
 

@@ -157,7 +157,6 @@ class _Rules:
         self._circular = _circular(self._before)
         self._aside: dict[tuple[str, int], Node] = {}
         self._kind = cache(find_kind)
-        self._master = cache(find_master)
 
     def of(self, index: int, step: Step) -> Iterator[_Found]:
         yield from self._times(index, step)
@@ -204,7 +203,12 @@ class _Rules:
                 if not lines:
                     yield "send", "expected one line at least, got none", "give one"
                 spoken = check(bus).name
-                if (master := self._master(spoken)) is None:
+                try:
+                    master = find_master(spoken)
+                except BadRequest as wrong:
+                    yield "send", str(wrong), "or give bytes, as raw"
+                    return
+                if master is None:
                     what = f"expected a bus whose protocol has a master here, got {spoken}"
                     yield "send", what, "install one, or give bytes, as raw"
                     return

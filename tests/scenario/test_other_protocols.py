@@ -9,13 +9,19 @@ from textwrap import dedent
 
 import pytest
 
-from sacbus.links import LinkError
+from sacbus.configuration import check
+from sacbus.kernel import Kernel, LineRate
+from sacbus.links import Line, LinkError
+from sacbus.mother.masters import Came
 from sacbus.mother.superstepper_words import COMMANDS
 from sacbus.scenario import run, run_on_link, run_real
+from sacbus.scenario.bench import far_bench
+from tests.mother.third_party import install
 from tests.scenario.stage import failures, mistakes, played, scenario
 from tests.serving import served
 
 HEAD = '[[bus]]\n[[bus.nodes]]\naddresses = "0,3"\nkind = "ss-mst67"\n'
+SAC = '[[bus]]\n[[bus.nodes]]\naddresses = "10"\n'
 NINE = HEAD + 'jmp2 = "closed"\n'
 
 
@@ -206,6 +212,31 @@ def test_what_became_of_lines_is_in_the_recording(tmp_path: Path) -> None:
         (3, "status", "ack", 1),
         (9, "stop", "no answer", 3),
     ]
+
+
+def test_bytes_are_played_where_the_master_is_broken_and_lines_are_refused_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, "sac = nowhere:MASTER")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    raw = '[[step]]\nraw = "02"\n[[step]]\nexpect = { acks = 0 }\n'
+    assert failures(tmp_path / "a.toml", raw, SAC) == []
+    assert mistakes(tmp_path / "a.toml", SAC + '[[step]]\nsend = "10"\n') == [
+        (
+            "step[0].send: the master of 'sac' (nowhere:MASTER) cannot be loaded: "
+            "ModuleNotFoundError(\"No module named 'nowhere'\"); mend or uninstall its package, "
+            "line 5, or give bytes, as raw"
+        )
+    ]
+
+
+def test_a_line_that_was_gone_before_the_first_line_is_gone_for_that_too(tmp_path: Path) -> None:
+    one = scenario(tmp_path / "a.toml", '[[step]]\nraw = "02"\n', SAC)
+    bench = far_bench("bus", Kernel(), check(one.buses[0]), Line("far"), LineRate(), 0)
+    bench.lose("it is gone")
+    came: list[Came] = []
+    bench.master.ask("10", came.append)
+    assert [str(one) for one in came] == ["lost (it is gone)"]
 
 
 def test_wrong_words_are_named_before_anything_is_played(tmp_path: Path) -> None:
