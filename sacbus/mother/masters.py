@@ -42,16 +42,18 @@ class Came:
 
     ``outcome``: ``ack``; ``sent`` for what nobody answers; ``nak``; ``no answer``; ``unknown`` for
     what may have been executed, or not; ``lost`` with the line. ``attempts``: how often it went.
-    ``words``: what an answer brought, or what went wrong, for people; empty for a mere ACK.
+    ``words``: what an answer said, or what went wrong, for people; empty where answers bring no
+    words. ``mere``: an answer that says no more than ``outcome`` does, a protocol's plain ACK.
     """
 
     line: Addressed
     outcome: str
     attempts: int = 1
     words: str = ""
+    mere: bool = False
 
     def __str__(self) -> str:
-        return f"{self.outcome} ({self.words})" if self.words else self.outcome
+        return self.outcome if self.mere or not self.words else f"{self.outcome} ({self.words})"
 
 
 #: Puts bytes on a line; with a 0 or 1 for each as its ninth bit where that says something.
@@ -87,6 +89,11 @@ class Master(Contract):
 
 class MasterKind(Contract):
     """The masters of a protocol, as an entry point of the group ``sacbus.masters`` gives them."""
+
+    @property
+    def answers_in_words(self) -> bool:
+        """Whether an answer brings words; without, nobody can ask for what one must say."""
+        ...
 
     def read(self, line: str) -> Addressed:
         """Whom a line is for; BadRequest, naming what is expected, for one that cannot be sent."""

@@ -63,6 +63,9 @@ class SacMaster:
 class SacMasterKind:
     """The entry point ``sac`` of the group ``sacbus.masters``."""
 
+    #: ACK and NAK are all that a SAC answers.
+    answers_in_words = False
+
     def read(self, line: str) -> Addressed:
         """An address, and the command right behind it."""
         to, body = _taken_apart(line)

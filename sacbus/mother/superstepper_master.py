@@ -65,6 +65,9 @@ class SuperStepperMaster:
 class SuperStepperMasterKind:
     """The entry points ``superstepper`` and ``superstepper-9`` of the group ``sacbus.masters``."""
 
+    #: Each answer brings a value, or at least what the module has seen of the line.
+    answers_in_words = True
+
     def read(self, line: str) -> Addressed:
         """An address and a command: ``3 stop``. There is no message for all modules."""
         order = read_line(line)
@@ -92,8 +95,8 @@ class SuperStepperMasterKind:
 def _came(order: Order, outcome: Answered | MotherError) -> Came:
     to = Addressed(order.address, order.text)
     if isinstance(outcome, Answered):
-        words = meaning(order.command, outcome.answer)
-        return Came(to, "ack", outcome.attempts, "" if words == "ACK" else words)
+        said = meaning(order.command, outcome.answer)
+        return Came(to, "ack", outcome.attempts, said.words, said.mere)
     attempts = getattr(outcome, "attempts", 1)
     return Came(to, _OUTCOMES.get(type(outcome), "lost"), attempts, str(outcome))
 

@@ -212,10 +212,14 @@ class _Rules:
                     what = f"expected a bus whose protocol has a master here, got {spoken}"
                     yield "send", what, "install one, or give bytes, as raw"
                     return
+                says = deed.says if isinstance(deed, Send) else None
                 for line in lines:
-                    yield from self._line(bus, master, line, outcome)
-                if isinstance(deed, Send) and deed.says is not None and outcome != "ack":
+                    yield from self._line(bus, master, line, outcome, says)
+                if says is not None and outcome != "ack":
                     yield "says", f"expected only with outcome ack, got {outcome}", "remove it"
+                elif says is not None and not master.answers_in_words:
+                    what = f"expected a protocol whose answers bring words, got {spoken}"
+                    yield "says", what, "remove it"
                 if isinstance(deed, Poll) and deed.every <= 0:
                     yield "every", "expected a time of more than 0, got 0 s", "correct it"
             case Raw(data=data):
@@ -270,7 +274,12 @@ class _Rules:
             yield "lift", what, f"correct it; {words}"
 
     def _line(
-        self, bus: Configuration, master: MasterKind, line: str, outcome: str
+        self,
+        bus: Configuration,
+        master: MasterKind,
+        line: str,
+        outcome: str,
+        says: str | None,
     ) -> Iterator[_Found]:
         try:
             to = master.read(line)
@@ -279,6 +288,9 @@ class _Rules:
         else:
             if not to.everybody and outcome == "ack":
                 yield from self._nodes(bus, (to.node,), "send")
+            elif to.everybody and says is not None and master.answers_in_words:
+                what = f"expected only with lines that are answered, got {line!r} to all"
+                yield "says", what, "remove it"
 
     def _nodes(self, bus: Configuration, nodes: Iterable[int], key: str) -> Iterator[_Found]:
         nodes = tuple(nodes)

@@ -174,6 +174,27 @@ def test_what_an_answer_brings_is_told_and_must_be_as_expected(tmp_path: Path) -
     )
 
 
+def test_a_mere_acknowledge_says_ack_as_it_is_printed_with_what_the_module_has_seen(
+    tmp_path: Path,
+) -> None:
+    text = """
+        [[step]]
+        send = ["3 stop", "3 write 0x10 1"]
+        says = "ACK"
+        [[step]]
+        send = "3 stop"
+        says = "at rest"
+        [[step]]
+        raw = "19 04 0f a0 00 0a ff ff ff ff ff"
+        [[step]]
+        wait = "100 ms"
+        send = "3 stop"
+        says = "ACK (it has seen: overrun)"
+        """
+    (told,) = failures(tmp_path / "a.toml", text, HEAD)
+    assert "expected '3 stop' to be answered 'at rest', got ack, at" in told
+
+
 def test_a_polled_answer_is_told_with_what_it_brings(tmp_path: Path) -> None:
     text = '[[step]]\nsend = "3 status"\nevery = "1 s"\nfor = "10 ms"\noutcome = "nak"\n'
     (told,) = failures(tmp_path / "a.toml", text, HEAD)
