@@ -10,7 +10,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Final
 
-from sacbus.bus import Port
+from sacbus.bus import PLAIN_BITS, Port
 from sacbus.bus.transmission import Transmission
 from sacbus.hosted import HostedBus
 from sacbus.kernel import MS, LineRate, Ns
@@ -185,16 +185,21 @@ def hosted_bench(hosted: HostedBus) -> Bench:
 def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
     """A bus in this process, with its master at the far end of one of its links, in real time."""
     kernel, bus = hosted.host.kernel, hosted.bus
-    # The link's end is a pty, which has no ninth bits: bytes with some get on the line beside it.
+    # The link's end is a pty, which has no ninth bits: where there are some, bytes get on the line
+    # beside it, all of them, for a stop bit of 1 stands in that place of a pty's.
     beside = Port(bus.medium, _deaf, latency=0, name="mother")
+    nine = bus.rate.bits > PLAIN_BITS
+
+    def send(data: bytes) -> None:
+        say(data, None)
 
     def say(data: bytes, ninth: bytes | None) -> None:
-        if ninth is None:
-            link.send(data)
+        if nine:
+            hosted.host.arrive(beside.talk, data, 0 if ninth is None else ninth)
         else:
-            hosted.host.arrive(beside.talk, data, ninth)
+            link.send(data)
 
-    bench = Bench(bus.name, kernel, bus.protocol, bus.rate, link.send, say, slack=slack)
+    bench = Bench(bus.name, kernel, bus.protocol, bus.rate, send, say, slack=slack)
     _watch(bench, hosted)
     link.start(
         lambda data: hosted.host.arrive(bench.hear, data),
@@ -206,16 +211,14 @@ def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
 def far_bench(
     name: str, clock: Clock, protocol: Protocol, link: Link, rate: LineRate, slack: Ns
 ) -> Bench:
-    """A line at the far end of a link: what comes back is all that can be seen of it."""
+    """A line at the far end of a link: what comes back is all that can be seen of it.
+
+    On a line with ninth bits the link must be one that can mark bytes.
+    """
+    nine = rate.bits > PLAIN_BITS
 
     def send(data: bytes) -> None:
-        link.send(data)
-        said(data, None)
-
-    def said(data: bytes, ninth: bytes | None) -> None:
-        now = clock.now
-        end = now + rate.span(len(data))
-        bench.line.note(Passed(now, end, 0, "mother", data, ninth=ninth))
+        say(data, None)
 
     def hear(data: bytes) -> None:
         now = clock.now
@@ -224,11 +227,15 @@ def far_bench(
         bench.hear(data)
 
     def say(data: bytes, ninth: bytes | None) -> None:
-        if ninth is None:
-            send(data)
-        else:
+        if nine:
+            # All of them: beside marked bytes others would have the parity of the moment.
+            ninth = bytes(len(data)) if ninth is None else ninth
             link.send_marked(data, ninth)
-            said(data, ninth)
+        else:
+            link.send(data)
+        now = clock.now
+        end = now + rate.span(len(data))
+        bench.line.note(Passed(now, end, 0, "mother", data, ninth=ninth))
 
     bench = Bench(name, clock, protocol, rate, send, say, slack=slack)
     link.start(hear, bench.lose)

@@ -139,6 +139,45 @@ def test_words_of_9_bits_take_a_link_that_can_mark_them(tmp_path: Path) -> None:
     assert [str(failure) for failure in result.failures] == []
 
 
+UNMARKED = """
+    [[step]]
+    raw = "1f 00"
+    [[step]]
+    expect = { silence = "100 ms" }
+    [[step]]
+    send = "3 status"
+    says = "at rest"
+    """
+
+
+def test_bytes_are_not_marked_unless_they_are_said_to_be(tmp_path: Path) -> None:
+    assert failures(tmp_path / "a.toml", UNMARKED, NINE) == []
+    (told,) = failures(tmp_path / "a.toml", UNMARKED.replace("1f", "^1f"), NINE)
+    assert "expected silence" in told
+
+
+@pytest.mark.slow
+def test_nor_are_they_in_real_time_or_on_a_link(tmp_path: Path) -> None:
+    one = scenario(tmp_path / "a.toml", UNMARKED, NINE)
+    assert [str(failure) for failure in run_real(one).failures] == []
+    model = ("--kind", "ss-mst67", "--set", "jmp2=closed", "--nodes", "0,3", "--baud", "9600")
+    with served("--ephemeral", *model, "--rfc2217", "0") as sacbus:
+        result = run_on_link(one, sacbus.ready["links"][0]["url"])
+    assert [str(failure) for failure in result.failures] == []
+
+
+@pytest.mark.slow
+def test_bytes_alone_take_a_link_that_marks_them_too(tmp_path: Path) -> None:
+    one = scenario(tmp_path / "a.toml", '[[step]]\nraw = "1f 00"\n', NINE)
+    model = ("--kind", "ss-mst67", "--set", "jmp2=closed", "--nodes", "0,3", "--baud", "9600")
+    port = str(tmp_path / "port")
+    with (
+        served("--ephemeral", *model, "--pty", port),
+        pytest.raises(LinkError, match="no ninth bits there"),
+    ):
+        run_on_link(one, port)
+
+
 def test_lines_of_each_are_polled_in_turn(tmp_path: Path) -> None:
     text = """
         [[step]]

@@ -193,8 +193,8 @@ def test_what_nobody_answers_says_nothing(tmp_path: Path, monkeypatch: pytest.Mo
         refuse(Scenario("x", (MODULES,), (Step(Send(("all stop", "30 stop"), says="ACK")),)))
     assert [str(one) for one in wrong.value.mistakes] == [
         (
-            "steps[0].says: expected only with lines that are answered, got 'all stop' to all, 'x', "
-            "remove it"
+            "steps[0].says: expected only with lines that are answered, got 'all stop' to all, "
+            "'x', remove it"
         )
     ]
 
