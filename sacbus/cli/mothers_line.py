@@ -46,7 +46,7 @@ async def check_spoken(link: str) -> None:
         return
     spoken = feed.hello.protocol
     await feed.close()
-    if spoken != SPEAKS:
+    if spoken not in SPEAKS:
         raise LinkError(
             f"this line speaks {spoken}, to which a SAC's commands mean something else",
             link,
