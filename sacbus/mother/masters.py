@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
-from typing import Final, NamedTuple
+from typing import Final, Generic, NamedTuple, TypeVar
 from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
@@ -20,7 +20,17 @@ from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest
 from sacbus.mother.statistics import NodeStatistics
 
-__all__ = ["GROUP", "Addressed", "Came", "Master", "MasterKind", "Speak", "find_master"]
+__all__ = [
+    "GROUP",
+    "Addressed",
+    "Came",
+    "Master",
+    "MasterBase",
+    "MasterKind",
+    "Speak",
+    "Transactions",
+    "find_master",
+]
 
 GROUP: Final = "sacbus.masters"
 
@@ -60,13 +70,28 @@ class Came:
 Speak = Callable[[bytes, bytes | None], object]
 
 
-class Master(Contract):
-    """A master on one line, one request at a time, by the rules of its protocol."""
+class Transactions(Contract):
+    """What requests become on one line, one at a time, by the rules of a protocol."""
 
     @property
     def statistics(self) -> Mapping[int, NodeStatistics]:
         """What has been counted of each node."""
         ...
+
+    def hear(self, data: bytes) -> None:
+        """Bytes of the nodes have arrived."""
+        ...
+
+    def lose(self, why: str) -> None:
+        """The line is gone: everything that waits is lost, and so is all that is asked later."""
+        ...
+
+
+_T = TypeVar("_T", bound=Transactions)
+
+
+class Master(Transactions, Contract):
+    """A master on one line, who is asked in words."""
 
     def ask(
         self, line: str, done: Callable[[Came], object], *, accept_duplicates: bool = False
@@ -78,13 +103,25 @@ class Master(Contract):
         """
         ...
 
+
+class MasterBase(Generic[_T]):
+    """What masters of the project share: the line is their transactions' own business."""
+
+    def __init__(self, transactions: _T) -> None:
+        self._transactions = transactions
+
+    @property
+    def statistics(self) -> Mapping[int, NodeStatistics]:
+        """As :class:`Transactions` has it; and so the others."""
+        return self._transactions.statistics
+
     def hear(self, data: bytes) -> None:
-        """Bytes of the nodes have arrived."""
-        ...
+        """Bytes from the line."""
+        self._transactions.hear(data)
 
     def lose(self, why: str) -> None:
-        """The line is gone: everything that waits is lost, and so is all that is asked later."""
-        ...
+        """The line is gone."""
+        self._transactions.lose(why)
 
 
 class MasterKind(Contract):
