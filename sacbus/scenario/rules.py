@@ -95,8 +95,6 @@ def complaints(scenario: Scenario) -> Iterator[Complaint]:
         what = f"expected a name of its own for each, got {twice[0]!r} twice"
         yield Complaint(None, "bus", what, "name them")
         return
-    for bus in scenario.buses:
-        check(bus)
     rules = _Rules(scenario)
     for index, step in enumerate(scenario.steps):
         for key, what, remedy in rules.of(index, step):
@@ -153,6 +151,8 @@ class _Rules:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._buses = {bus.name: bus for bus in scenario.buses}
+        #: Checked once each: that looks through all kinds of nodes, and there are many steps.
+        self._spoken = {bus.name: check(bus).name for bus in scenario.buses}
         self._before = predecessors(scenario.steps)
         self._circular = _circular(self._before)
         self._aside: dict[tuple[str, int], Node] = {}
@@ -202,7 +202,7 @@ class _Rules:
             case Send(lines=lines, outcome=outcome) | Poll(lines=lines, outcome=outcome):
                 if not lines:
                     yield "send", "expected one line at least, got none", "give one"
-                spoken = check(bus).name
+                spoken = self._spoken[bus.name]
                 try:
                     master = find_master(spoken)
                 except BadRequest as wrong:

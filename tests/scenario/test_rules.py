@@ -8,9 +8,9 @@ import pytest
 
 from sacbus.bus import Dead
 from sacbus.config import ConfigError
-from sacbus.configuration import Configuration
+from sacbus.configuration import Configuration, check
 from sacbus.kernel import SECOND
-from sacbus.node import SettingError
+from sacbus.node import Protocol, SettingError
 from sacbus.scenario import (
     Bounds,
     Counted,
@@ -197,6 +197,18 @@ def test_what_nobody_answers_says_nothing(tmp_path: Path, monkeypatch: pytest.Mo
             "'x', remove it"
         )
     ]
+
+
+def test_a_bus_is_looked_at_once_for_all_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[Configuration] = []
+
+    def look(bus: Configuration) -> Protocol:
+        looked.append(bus)
+        return check(bus)
+
+    monkeypatch.setattr("sacbus.scenario.rules.check", look)
+    refuse(Scenario("x", (BUS,), (Step(Send(("10",))),) * 20))
+    assert looked == [BUS]
 
 
 def test_a_protocol_without_a_master_takes_bytes_alone(monkeypatch: pytest.MonkeyPatch) -> None:
