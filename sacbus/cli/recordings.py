@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO, TextIO
 import click
 
 from sacbus.cli.options import STANDARD, WrongInput
-from sacbus.fresh import fresh_file
+from sacbus.fresh import NO_ROOM, fresh_file
 from sacbus.picture_format import PictureError, picture_format
 
 if TYPE_CHECKING:
@@ -108,8 +108,15 @@ def fresh_or_standard(path: Path) -> Iterator[BinaryIO]:
             yield file
         return
     sys.stdout.flush()
-    yield sys.stdout.buffer
-    sys.stdout.buffer.flush()
+    try:
+        yield sys.stdout.buffer
+        sys.stdout.buffer.flush()
+    except OSError as fault:
+        if fault.errno not in NO_ROOM:
+            raise
+        raise OSError(
+            f"standard output: {fault.strerror}, what was written is not whole, make room there"
+        ) from fault
 
 
 @contextmanager

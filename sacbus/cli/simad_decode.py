@@ -92,7 +92,8 @@ def decode_command(
         click.echo(json.dumps(found.as_json()))
     elif table != STANDARD:
         for one in found.as_json()["axes"]:
-            click.echo(f"axis {one['axis']}: {one['steps']} steps to {one['position']}")
+            steps = "1 step" if one["steps"] == 1 else f"{one['steps']} steps"
+            click.echo(f"axis {one['axis']}: {steps} to {one['position']}")
     return 0
 
 
