@@ -89,7 +89,8 @@ def _of_alike(
         ]
         for when, one, other in walk(said[0], said[1], within):
             yield Difference(when, bus.name, None, "packet", one, other)
-    over = min(expected.end, got.end)
+    ends = (expected.end, got.end)
+    over = min(ends)
     for node in expected.nodes:
         name = expected.buses[node.bus].name
         tracks = [each.track(node.address, node.bus) for each in (expected, got)]
@@ -97,11 +98,15 @@ def _of_alike(
             for when, one, other in _began(tracks[0], tracks[1]):
                 yield Difference(when, name, node.address, "motion", one, other)
             continue
+        # What comes late enough may do so behind the end of the other recording.
         states = [
-            [Entry(when, state) for when, state in track.states(0, over + 1)] for track in tracks
+            [Entry(when, state) for when, state in track.states(0, min(end, over + within) + 1)]
+            for track, end in zip(tracks, ends, strict=True)
         ]
         for when, one, other in walk(states[0], states[1], within):
-            yield Difference(when, name, node.address, "state", one, other)
+            unmet = [end for words, end in zip((one, other), ends, strict=True) if words == NOTHING]
+            if all(when + within <= end for end in unmet):
+                yield Difference(when, name, node.address, "state", one, other)
         apart = _parting(tracks[0], tracks[1], over, within, steps)
         if apart is not None:
             places = [f"{track.steps(apart):g} steps" for track in tracks]

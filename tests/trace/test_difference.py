@@ -46,6 +46,25 @@ def test_another_command_is_told_with_time_node_and_what_came_of_it() -> None:
     assert abs(float(position.expected.split()[0]) - float(position.got.split()[0])) == 1
 
 
+@pytest.mark.parametrize("late", [3 * MS, 11 * MS])
+def test_what_ends_as_much_later_as_is_allowed_is_no_difference(late: int) -> None:
+    def ending(after: float) -> Recording:
+        """Over with the last change of state, as a scenario is that waits for it."""
+
+        async def play(bus: HostedBus, mother: Mother, _recorder: Recorder) -> None:
+            await asyncio.sleep(after)
+            await mother.send(10, "m100v120")
+            while bus.snapshot(10).state != "STANDBY":  # noqa: ASYNC110 (virtual time)
+                await asyncio.sleep(0.000_1)
+
+        return recorded(play, Configuration(nodes=(10,)))
+
+    one, other = ending(0.1), ending(0.1 + late / 1e9)
+    for first, second in ((one, other), (other, one)):
+        found = differences(first, second, within=10 * MS)
+        assert bool(found) is (late > 10 * MS)
+
+
 def test_a_packet_that_is_missing_is_told_once() -> None:
     fewer, more = of("m100", " "), of("m100", "v50", " ")
     packets = [one for one in differences(fewer, more, within=100 * MS) if one.what == "packet"]
