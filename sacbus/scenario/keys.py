@@ -249,7 +249,7 @@ SEND: Final = (
         "for",
         TIME,
         _is_time,
-        "how long it polls; the step below waits for that",
+        "how long it polls; the step below waits for that and the last answer",
         otherwise="to the end",
     ),
 )
