@@ -129,7 +129,7 @@ def test_mistakes_of_all_files_are_told_and_nothing_is_played(
         ),
         (
             ["--link", "x", "--record", "y"],
-            "--record: expected a bus in this process, got --link, see sacbus monitor",
+            "--record: expected a bus in this process, got --link; sacbus monitor records a line",
         ),
     ],
 )

@@ -120,7 +120,7 @@ def run_command(
     kept = [option for option, path in pages.items() if path is not None]
     if kept and link is not None:
         raise click.UsageError(
-            f"{kept[0]}: expected a bus in this process, got --link, see sacbus monitor"
+            f"{kept[0]}: expected a bus in this process, got --link; sacbus monitor records a line"
         )
     if speed is not None and not real:
         raise click.UsageError("--speed: expected only with --real")

@@ -25,6 +25,9 @@ HIGHEST_BAUD: Final = 4_000_000
 #: TOML's whole numbers have 64 bits.
 _LARGEST: Final = (1 << 63) - 1
 
+#: Arrays of so many values are shown as they stand.
+_SHORT: Final = 3
+
 #: A second of silence before a program's bytes go out is more than any adapter adds.
 MOST_LATENCY_US: Final = 1_000_000
 
@@ -59,6 +62,8 @@ def shown(value: object) -> str:
             return "a number of more than 64 bits"
         case dict():
             return "a table"
+        case list() if len(value) <= _SHORT and not any(isinstance(one, list) for one in value):
+            return f"[{', '.join(map(shown, value))}]"
         case list():
             return "an array"
         case str() | int() | float():

@@ -26,6 +26,11 @@ MOST_BYTES: Final = 1 << 20
 _AT: Final = re.compile(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", re.DOTALL)
 
 
+#: How tomllib begins them where a header is there already, as a table or as an array of some.
+_CLASHES: Final = ("Cannot declare", "Cannot overwrite a value")
+_HEADER: Final = re.compile(r"\s*(\[{1,2})\s*([^\[\]#]*?)\s*\]{1,2}\s*(?:#.*)?")
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """A text that is TOML. ``directory`` is where its relative paths begin."""
@@ -81,6 +86,29 @@ def parse(data: bytes, name: str, directory: Path, sort: str = "configuration") 
     return Source(name, directory, content, found)
 
 
+def _single(text: str, line: int) -> tuple[str, str, int] | None:
+    """Of two headers that clash, what is wrong, what to do and in which line; ``line``: the second.
+
+    The likeliest slip with arrays of tables is a header with a bracket too few.
+    """
+    headers = {
+        at: (hit[1], hit[2])
+        for at, one in enumerate(text.split("\n")[:line], 1)
+        if (hit := _HEADER.fullmatch(one))
+    }
+    if line not in headers:
+        return None
+    name = headers[line][1]
+    alike = [at for at, one in headers.items() if one[1] == name]
+    single = [at for at in alike if headers[at][0] == "["]
+    if len(alike) < 2 or not single:
+        return None
+    if len(single) < len(alike):
+        return f"expected [[{name}]] each time, got [{name}]", f"write [[{name}]]", single[0]
+    what = f"expected [{name}] once, got it twice"
+    return what, f"write [[{name}]] where there may be several", line
+
+
 def _not_toml(name: str, text: str, said: str) -> ConfigError:
     what, line, column = said, None, None
     if hit := _AT.fullmatch(said):
@@ -88,6 +116,8 @@ def _not_toml(name: str, text: str, said: str) -> ConfigError:
         line, column = text.count("\n") + 1, len(text) - text.rfind("\n")
         if hit[2]:
             line, column = int(hit[2]), int(hit[3])
+    if line is not None and what.startswith(_CLASHES) and (told := _single(text, line)):
+        return _wrong(name, f"not TOML: {told[0]}", told[1], told[2])
     what = " ".join(what.split())
     return _wrong(name, f"not TOML: {what[:1].lower()}{what[1:]}", "correct it", line, column)
 

@@ -7,7 +7,7 @@ something else, is remembered, so that nobody complains of it a second time.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -16,7 +16,7 @@ from sacbus.config.keys import Key, shown
 from sacbus.config.lines import Path
 from sacbus.config.mistake import Findings
 
-__all__ = ["Table", "nearest", "remedy", "tables"]
+__all__ = ["Table", "instead", "nearest", "remedy", "tables"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class Table:
                     if isinstance(value, list | dict) and meant in _SECTIONS:
                         values[meant] = value  # so that its own mistakes are told as well
                 if whole or meant is not None:
-                    findings.add((*path, name), "unknown key", _instead(meant, known))
+                    findings.add((*path, name), "unknown key", _in_place_of(meant, known))
             elif key.fits(value):
                 values[name] = value
             else:
@@ -118,12 +118,17 @@ def remedy(key: Key, value: object = None) -> str:
     return f"correct it, or leave it out for {shown(key.default)}"
 
 
-def nearest(word: str, known: Sequence[str]) -> str | None:
+def nearest(word: str, known: Collection[str]) -> str | None:
     """The known word that was probably meant."""
     return next(iter(get_close_matches(word, known, n=1)), None)
 
 
-def _instead(meant: str | None, known: Mapping[str, Key]) -> str:
+def instead(word: str, known: Collection[str]) -> str:
+    """What to do about a word that is none of the known ones."""
+    return _in_place_of(nearest(word, known), known)
+
+
+def _in_place_of(meant: str | None, known: Collection[str]) -> str:
     if meant is not None:
         return f"did you mean {meant!r}?"
     return f"remove it; known here: {', '.join(known)}"

@@ -4,7 +4,7 @@ MotherError                        everything below
 ├── BadRequest (ValueError)        we were asked to send what no node could receive
 ├── Refused                        the node answered NAK, every time
 ├── NoAnswer (TimeoutError)        silence, and what was asked may safely be asked again
-├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not
+├── UnknownOutcome (TimeoutError)  silence: the node may have acted, or not, and must not twice
 ├── NotStarted                     of several that were to start together, none has
 ├── Stopped                        an emergency stop came before its turn; never sent
 └── LineLost (ConnectionError)     the link is gone
@@ -58,15 +58,23 @@ class Refused(_Unanswered):
 
 
 class NoAnswer(_Unanswered, TimeoutError):
-    """Silence, every time. What was asked may be asked again without harm."""
+    """Silence, and ``refusals`` times NAK. What was asked may be asked again without harm."""
 
     verdict = "nobody at that address, its ACK is switched off, or the baud rate is another"
 
+    def __init__(self, node: int, line: str, attempts: int, last: str, refusals: int = 0) -> None:
+        self.refusals = refusals
+        if refusals:
+            # Somebody is there: it is the line that is bad.
+            self.verdict = (
+                f"NAK {refusals} of {attempts} times, and silence; "
+                "check the line, and send it again, which does no harm"
+            )
+        super().__init__(node, line, attempts, last)
+
 
 class UnknownOutcome(_Unanswered, TimeoutError):
-    """Silence, and the node may have executed the command, or not.
-
-    So it is for a command that must not run twice, and for one that met silence as well as NAK.
+    """Silence, and the node may have executed the command, which must not run twice, or not.
 
     SAC has no sequence numbers, so a lost ACK cannot be told from a lost packet.
     """

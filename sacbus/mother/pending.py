@@ -50,9 +50,8 @@ class Pending:
         line = self.body.decode("latin-1").rstrip(" ")
         if not self.attempts:
             return Stopped(self.node, line)
-        kind: type[Refused | NoAnswer | UnknownOutcome] = UnknownOutcome
         if self.refusals == self.attempts:
-            kind = Refused
-        elif self.may_repeat and not self.refusals:
-            kind = NoAnswer
-        return kind(self.node, line, self.attempts, self.last)
+            return Refused(self.node, line, self.attempts, self.last)
+        if self.may_repeat:
+            return NoAnswer(self.node, line, self.attempts, self.last, self.refusals)
+        return UnknownOutcome(self.node, line, self.attempts, self.last)

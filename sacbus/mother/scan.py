@@ -20,7 +20,7 @@ from typing import Final
 
 from sacbus.kernel import MS, Ns
 from sacbus.mother.caller import TRIES, Caller
-from sacbus.mother.errors import NoAnswer, Refused, UnknownOutcome
+from sacbus.mother.errors import NoAnswer, Refused
 from sacbus.mother.outcome import Acknowledged, Done
 from sacbus.mother.request import checked_address
 
@@ -118,8 +118,10 @@ class _Scan:
             answer = await self._ask(request)
         except NoAnswer as silence:
             self._asked[node] += silence.attempts
-        except (Refused, UnknownOutcome) as refusal:
-            # NAK, of now and then too: somebody is there, on a line that is bad.
+            if silence.refusals:
+                # NAK now and then: somebody is there, on a line that is bad.
+                self.late.add(node)
+        except Refused as refusal:
             self._asked[node] += refusal.attempts
             self.late.add(node)
         else:

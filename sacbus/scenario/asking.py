@@ -25,30 +25,46 @@ class Polling:
 
     Where that took longer than the pace allows, the next ones follow at once until it is made up
     for. A line costs one appointment besides those of its exchange, and no task of a loop.
+
+    What is sent is what comes due before its time is over, by the pace and by the answers and not
+    by when an appointment is kept, which in real time is a little late: so the lines are as many in
+    every run. It is over, and ``over`` is called, with the answer to the last of them.
     """
 
-    def __init__(self, bench: Bench, poll: Poll, failed: Callable[[str, str], None]) -> None:
+    def __init__(
+        self,
+        bench: Bench,
+        poll: Poll,
+        failed: Callable[[str, str], None],
+        over: Callable[[], object],
+    ) -> None:
         self._bench = bench
         self._poll = poll
         self._failed = failed
+        self._over = over
         self._next = 0
         self._due: Ns = 0
+        #: None: it goes on to the end.
+        self._until: Ns | None = None
         self._failures = 0
         self._goes_on: Callable[[], bool] = lambda: True
-        self._stopped = False
+        #: The answer to the last line is in.
+        self._settled = False
+        self._time_is_up = False
 
     def begin(self, goes_on: Callable[[], bool]) -> None:
-        """Ask from now on, as long as ``goes_on()`` holds and nobody stops it."""
+        """Ask from now on, as long as ``goes_on()`` holds."""
+        clock = self._bench.clock
         self._goes_on = goes_on
-        self._due = self._bench.clock.now
+        self._due = now = clock.now
+        if self._poll.lasting is not None:
+            self._until = now + self._poll.lasting
         self._ask()
-
-    def stop(self) -> None:
-        """Ask no more."""
-        self._stopped = True
+        if self._until is not None:
+            clock.at(self._until, self._end_of_time)
 
     def _ask(self) -> None:
-        if self._stopped or not self._goes_on():
+        if not self._goes_on():
             return
         self._due += self._poll.every
         self._bench.master.ask(self._poll.lines[self._next], self._done)
@@ -63,7 +79,18 @@ class Polling:
                 self._failed(f"poll {line!r} to end in {wanted}", f"{came}{more}")
         self._next = (self._next + 1) % len(self._poll.lines)
         clock = self._bench.clock
-        clock.at(max(self._due, clock.now), self._ask)
+        when = max(self._due, clock.now)
+        if self._until is None or when < self._until:
+            clock.at(when, self._ask)
+            return
+        self._settled = True
+        if self._time_is_up:
+            self._over()
+
+    def _end_of_time(self) -> None:
+        self._time_is_up = True
+        if self._settled:
+            self._over()
 
 
 def outcome_of(came: Came) -> Outcome:

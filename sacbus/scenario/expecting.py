@@ -24,7 +24,7 @@ from sacbus.scenario.expectations import (
     Straight,
     Together,
 )
-from sacbus.scenario.keys import EXPECT, EXPECTED
+from sacbus.scenario.keys import BESIDE, EXPECT, EXPECTED
 from sacbus.scenario.quantity import bounds, nanoseconds
 from sacbus.wire import DC1, DC2
 
@@ -53,6 +53,7 @@ class ExpectationReader:
         within, lasting = time_of(table, "within") or 0, time_of(table, "for") or 0
         if within and lasting:
             self._findings.add(table.at("for"), "expected within or for, got both", "leave one out")
+        self._beside(table, sort, sorts[sort])
         nodes = self.nodes(table.get("node"), bus) if "node" in table.values else None
         if sort in ("node", "shown", "start_skew", "deviation") and nodes is None:
             if table.lacks("node"):
@@ -91,6 +92,16 @@ class ExpectationReader:
                     if EXPECTED[name] == "count" and name in table.values
                 }
                 return Counted(counts, nodes, within, lasting, bus)
+
+    def _beside(self, table: Table, sort: str, name: str) -> None:
+        """What says more of one sort of thing, and nothing of this."""
+        for beside, of in BESIDE.items():
+            if beside in table.values and sort not in of:
+                other = {"node": "from", "from": "node"}.get(beside, "")
+                meant = sort in BESIDE.get(other, ()) and other not in table.values
+                what = f"expected none with {name}, got one"
+                remedy = f"did you mean {other!r}?" if meant else "remove it"
+                self._findings.add(table.at(beside), what, remedy)
 
     def _shown(
         self, table: Table, nodes: tuple[int, ...], within: Ns, bus: str

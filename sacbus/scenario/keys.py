@@ -16,6 +16,7 @@ from sacbus.scenario.parameters import RESERVED, is_value
 from sacbus.scenario.quantity import QuantityError, bounds, marked_bytes, nanoseconds
 
 __all__ = [
+    "BESIDE",
     "DEEDS",
     "EXPECT",
     "EXPECTED",
@@ -32,7 +33,7 @@ __all__ = [
 #: Steps that a scenario may have when its loops are unrolled.
 MOST_STEPS: Final = 10_000
 
-_BOUNDS: Final = 'a number, [low, high], "<= 3" or ">= 3"'
+_BOUNDS: Final = 'a number, [low, high] such as [3, 5], "<= 3" or ">= 3"'
 _NODES: Final = 'an address, addresses like "10-12,85", or "all"'
 
 
@@ -249,7 +250,7 @@ SEND: Final = (
         "for",
         TIME,
         _is_time,
-        "how long it polls; the step below waits for that",
+        "how long it polls; the step below waits for that and the last answer",
         otherwise="to the end",
     ),
 )
@@ -307,6 +308,16 @@ EXPECTED: Final = {
     "timeouts": "count",
     "collisions": "count",
     "warnings": "count",
+}
+
+#: What stands beside these, by the sorts of expectations of which it says more.
+BESIDE: Final = {
+    "node": ("node", "shown", "start_skew", "deviation", "count"),
+    "from": ("packet", "silence"),
+    "to": ("packet",),
+    "count": ("packet",),
+    "within": ("node", "shown", "packet", "count"),
+    "for": ("node", "count"),
 }
 
 EXPECT: Final = (

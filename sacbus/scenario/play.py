@@ -295,22 +295,17 @@ class Play:
         )
 
     def _begin_poll(self, index: int, poll: Poll) -> None:
-        polling = Polling(self._bench(poll.bus), poll, partial(self._poll_failed, index))
-        self._background.add(index)
+        failed, over = partial(self._poll_failed, index), partial(self._settle, index)
+        polling = Polling(self._bench(poll.bus), poll, failed, over)
+        if poll.lasting is None:
+            self._background.add(index)
         polling.begin(lambda: not self.over)
-        if poll.lasting is not None:
-            self._background.discard(index)
-            self._clock.at(self._clock.now + poll.lasting, self._poll_over, index, polling)
-        else:
+        if poll.lasting is None:
             self._release(index, self._clock.now)
 
     def _poll_failed(self, index: int, expected: str, got: str) -> None:
         if not self.over:
             self._fail(index, expected, got)
-
-    def _poll_over(self, index: int, polling: Polling) -> None:
-        polling.stop()
-        self._settle(index)
 
     def _out_at(self, when: Ns, index: int, bench: Bench) -> None:
         """Raw bytes should be out then; they are not while the line was taken."""

@@ -68,7 +68,9 @@ def bounds(value: object) -> Bounds:
     ):
         limit = float(found[2])
         return Bounds(-inf, limit) if found[1] == "<" else Bounds(limit, inf)
-    raise QuantityError(f'expected a number, [low, high], "<= 3" or ">= 3", got {shown(value)}')
+    raise QuantityError(
+        f'expected a number, [low, high] such as [3, 5], "<= 3" or ">= 3", got {shown(value)}'
+    )
 
 
 def marked_bytes(text: str) -> tuple[bytes, bytes | None]:

@@ -22,7 +22,7 @@ from sacbus.scenario.parameters import MOST_CASES, Value, cases, put_in
 from sacbus.scenario.quantity import nanoseconds
 from sacbus.scenario.rules import complaints
 from sacbus.scenario.steps import StepReader, Written
-from sacbus.scenario.values import Scenario
+from sacbus.scenario.values import Lift, Scenario, Step
 
 __all__ = ["read"]
 
@@ -61,6 +61,13 @@ def read(
     return tuple(found)
 
 
+def _named(step: Step, key: str) -> str | None:
+    """The other step that a key of this one names; None where it names none."""
+    if key == "lift" and isinstance(step.does, Lift):
+        return step.does.step
+    return step.after if key == "after" and isinstance(step.after, str) else None
+
+
 class _CaseReader:
     """One case of a scenario."""
 
@@ -72,6 +79,8 @@ class _CaseReader:
         self._case = case
         self._seed = seed
         self._findings = Findings(source.name, source.lines)
+        #: Names of steps that were left out for what is wrong with them.
+        self._left_out: set[str] = set()
         self.mistakes: list[Mistake] = []
 
     def scenario(self, varying: Mapping[str, Value]) -> Scenario | None:
@@ -92,6 +101,8 @@ class _CaseReader:
         if buses:
             for complaint in complaints(scenario):
                 assert complaint.step is not None, "there is a bus"
+                if _named(steps[complaint.step], complaint.key) in self._left_out:
+                    continue
                 path = written[complaint.step].path
                 where = (*path, *filter(None, complaint.key.split(".")))
                 self._findings.add(where, complaint.what, complaint.remedy)
@@ -103,7 +114,9 @@ class _CaseReader:
         if content == []:
             self._findings.add(("step",), "expected one [[step]] at least, got none", "add one")
         reader = StepReader(self._source, self._findings, buses)
-        return reader.read(("step",), content, "step", self._case)
+        written = reader.read(("step",), content, "step", self._case)
+        self._left_out = reader.left_out
+        return written
 
     def _put(self, key: str, value: object) -> object:
         return put_in(value, self._case, (key,), self._findings, set())

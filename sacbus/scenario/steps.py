@@ -10,12 +10,13 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from sacbus.bus import FaultError, fault_from
+from sacbus.bus import FAULTS, FaultError, fault_from
 from sacbus.config import lines
 from sacbus.config.keys import Key, shown
 from sacbus.config.mistake import Findings
+from sacbus.config.notation import ranges
 from sacbus.config.source import Source
-from sacbus.config.table import Table, tables
+from sacbus.config.table import Table, instead, tables
 from sacbus.configuration import Configuration, check
 from sacbus.language.queue_file import WrongRow
 from sacbus.mother.request import SPEAKS
@@ -74,6 +75,8 @@ class StepReader:
         self._findings = findings
         self._buses = buses
         self._expected = ExpectationReader(findings, buses)
+        #: Names of steps that are left out.
+        self.left_out: set[str] = set()
         self._count = 0
         #: The bus of steps that name none: that of the group that they are in.
         self._bus = ""
@@ -102,6 +105,7 @@ class StepReader:
         each: tuple[int | None, ...] = (None,)
         if "each" in loop.values:
             each = self._expected.nodes(loop.get("each"), loop.get("bus", self._bus))
+            self._each_of_nothing(path, content, each, loop.get("bus", self._bus))
             if "every" in content and "send" in content:
                 content = self._round(path, content, each, scope)
                 each = (None,)
@@ -122,6 +126,23 @@ class StepReader:
                     return found
                 found += self._step(path, content, header, inner)
         return found
+
+    def _each_of_nothing(
+        self, path: lines.Path, content: Mapping[str, object], nodes: Sequence[int | None], bus: str
+    ) -> None:
+        """Where no text has {node} in it, nothing else would tell of a node that is not there."""
+        used: set[str] = set()
+        put_in(content, {"node": 0}, path, Findings("", {}), used)
+        for one in self._those(bus) if "node" not in used else ():
+            there = [node.address for node in one.every_node]
+            if missing := [node for node in nodes if node is not None and node not in there]:
+                have = f"nodes of bus {one.name!r} ({ranges(there) or 'it has none'})"
+                what = f"expected {have}, got {ranges(missing)}"
+                self._findings.add((*path, "each"), what, "correct it")
+
+    def _those(self, bus: str) -> Sequence[Configuration]:
+        """The bus of that name, or the first; none where it is wrong."""
+        return [one for one in self._buses if not bus or one.name == bus][:1]
 
     def _round(
         self,
@@ -160,11 +181,11 @@ class StepReader:
         if len(done) > 1:
             what = f"expected one thing to do, got {' and '.join(done)}"
             self._findings.add(path, what, "make several steps of it")
-            return []
+            return self._left_out(table)
         if not done and table.lacks("wait") and all(map(table.lacks, _DEEDS)):
             what = f"expected something to do ({', '.join(_DEEDS)}) or wait, got nothing"
             self._findings.add(path, what, "give one")
-            return []
+            return self._left_out(table)
         for name in _SENDS:
             if name in table.values and done and done != ["send"]:
                 self._findings.add(table.at(name), "expected only with send", "remove it")
@@ -172,8 +193,13 @@ class StepReader:
             return self._group(table, inside, header, scope)
         deed = self._deed(table, done[0] if done else "wait")
         if deed is None:
-            return []
+            return self._left_out(table)
         return [Written(self._when(table, deed), path)]
+
+    def _left_out(self, table: Table) -> list[Written]:
+        """No step; whoever names it is not to be told that there is none."""
+        self.left_out.add(table.get("name", ""))
+        return []
 
     def _group(
         self, table: Table, inside: object, header: str, scope: Mapping[str, Value]
@@ -257,6 +283,15 @@ class StepReader:
         return Poll(lines_, every, time_of(table, "for"), outcome, bus)
 
     def _fault(self, table: Table, value: Mapping[str, object], bus: str) -> Deed | None:
+        unknown = [name for name in value if name not in FAULTS]
+        for name in unknown:
+            self._findings.add((*table.at("fault"), name), "unknown key", instead(name, FAULTS))
+        if unknown:
+            return None
+        if len(value) > 1:
+            what = f"expected one fault, got {' and '.join(value)}"
+            self._findings.add(table.at("fault"), what, "make several steps of it")
+            return None
         try:
             return Disturb(fault_from(value), bus)
         except FaultError as wrong:
@@ -269,8 +304,8 @@ class StepReader:
         inner = self._inner(table, "queue", QUEUE)
         if not _has(inner, "node", "file"):
             return None
-        there = next((one for one in self._buses if not bus or one.name == bus), None)
-        if there is not None and (spoken := check(there).name) not in SPEAKS:
+        there = self._those(bus)
+        if there and (spoken := check(there[0]).name) not in SPEAKS:
             what = (
                 f"expected a bus that speaks {' or '.join(SPEAKS)}, as queue files do, got {spoken}"
             )

@@ -69,7 +69,8 @@ class Send:
 class Poll:
     """The bus's master sends the lines in turn, one each ``every``, for ``lasting``, or to the end.
 
-    A line whose time comes before the one before it is settled follows when that is.
+    A line whose time comes before the one before it is settled follows when that is. With
+    ``lasting`` it is over then, or with the answer to the last line, if that comes later.
     """
 
     lines: tuple[str, ...]

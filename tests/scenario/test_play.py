@@ -173,6 +173,29 @@ def test_polling_for_a_time_is_waited_for(file: Path) -> None:
     assert played(file, text).ended == SECOND
 
 
+def test_polling_is_over_with_the_answer_to_its_last_line(file: Path) -> None:
+    text = """
+        [[step]]
+        send = "10"
+        every = "10 ms"
+        for = "12 ms"
+        [[step]]
+        expect = { acks = 2 }
+        [[step]]
+        expect = { silence = "50 ms" }
+        """
+    assert failures(file, text) == []
+
+
+@pytest.mark.parametrize(("lasting", "lines"), [(1, 1), (19, 2), (20, 2), (21, 3)])
+def test_polling_sends_the_lines_that_are_due_before_its_time_is_over(
+    lasting: int, lines: int
+) -> None:
+    poll = Poll(("10",), 10 * MS, lasting * MS)
+    result = run(Scenario("poll", (Configuration(nodes=(10,)),), (Step(poll),)))
+    assert result.counts["bus"]["acks"] == lines
+
+
 def test_polling_faster_than_the_line_waits_for_each_answer() -> None:
     poll = Poll(("10", "11"), MS, SECOND)
     result = run(Scenario("fast", (Configuration(nodes=(10, 11)),), (Step(poll),)))

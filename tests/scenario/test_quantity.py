@@ -16,7 +16,7 @@ from sacbus.scenario.quantity import Bounds, QuantityError, bounds, marked_bytes
     [
         ("1.5 s", None),
         (3, f"expected {TIME}, got 3"),
-        (["1 s"], f"expected {TIME}, got an array"),
+        (["1 s"], f"expected {TIME}, got ['1 s']"),
         ("0.5 ns", "expected a whole number of ns, got '0.5 ns'"),
         ("10000 h", "expected a time of at most a year, got '10000 h'"),
     ],

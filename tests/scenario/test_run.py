@@ -25,6 +25,17 @@ MOVE = """
 
 POLL = '[[step]]\nat = "0 s"\nsend = "10"\nevery = "5 ms"\n'
 
+POLL_FOR = """
+    [[step]]
+    send = "10"
+    every = "100 ms"
+    for = "1 s"
+    [[step]]
+    expect = { silence = "300 ms" }
+    [[step]]
+    expect = { acks = 10 }
+    """
+
 LINE = """
     [[step]]
     send = ["10m40v300s", "11m40v300s", "0y"]
@@ -154,6 +165,15 @@ def test_on_a_link_the_line_is_all_there_is(file: Path) -> None:
         result = run_on_link(scenario(file, LINE), sacbus.link)
     assert [str(one) for one in result.failures] == []
     assert result.counts["bus"]["retries"] == 2
+
+
+@pytest.mark.slow
+def test_on_a_link_polling_sends_as_many_lines_as_in_virtual_time(file: Path) -> None:
+    one = scenario(file, POLL_FOR)
+    assert run(one).failures == []
+    with served("--nodes", "10,11") as sacbus:
+        result = run_on_link(one, sacbus.link)
+    assert [str(failure) for failure in result.failures] == []
 
 
 @pytest.mark.slow
