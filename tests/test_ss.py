@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -110,4 +111,25 @@ def test_a_line_that_cannot_be_had_is_told(link: str) -> None:
     status, _, error = ss("/no/such/port", "3", "status")
     assert status == 1
     assert error.startswith("error: cannot open the line (no such file), /no/such/port")
-    assert ss("--nine", link, "3", "status")[2].startswith("error: no ninth bits there")
+    master, slave = os.openpty()
+    assert ss("--nine", os.ttyname(slave), "3", "status")[2].startswith(
+        "error: no ninth bits there"
+    )
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_line_that_speaks_something_else_is_refused_before_a_byte_goes_out(link: str) -> None:
+    def refused(spoken: str, mine: str, where: str, advice: str) -> tuple[int, str, str]:
+        what = f"this line speaks {spoken}, to which messages of {mine} mean something else"
+        return 1, "", f"error: {what}, {where}, {advice}: nothing was sent"
+
+    plain, nine = "superstepper", "superstepper-9"
+    assert ss("--nine", link, "3", "stop") == refused(plain, nine, link, "leave --nine out")
+    with served("--ephemeral", "--nodes", "10") as sacs:
+        advice = "take a master of that protocol"
+        assert ss(sacs.link, "10", "stop") == refused("sac", plain, sacs.link, advice)
+    closed = ["--kind", "ss-mst67", "--nodes", "3", "--baud", "9600", "--set", "jmp2=closed"]
+    with served("--ephemeral", *closed) as modules:
+        there = modules.link
+        assert ss(there, "3", "stop") == refused(nine, plain, there, "add --nine")

@@ -10,6 +10,7 @@ import click
 
 from sacbus.cli.options import NO_ANSWER_STATUS, verbose
 from sacbus.cli.outcomes import NAK_STATUS, UNKNOWN_STATUS
+from sacbus.cli.spoken import check_spoken
 
 if TYPE_CHECKING:
     from sacbus.mother.superstepper_words import Command, Word
@@ -19,6 +20,12 @@ __all__ = ["ss_group"]
 
 #: What stands before the words of a command.
 _PLACES: Final = ("LINK", "ADDRESS", "COMMAND")
+
+#: What is spoken without --nine and with it, and what to do where the line speaks the other.
+_MODES: Final = (
+    ("superstepper", {"superstepper-9": "add --nine"}),
+    ("superstepper-9", {"superstepper": "leave --nine out"}),
+)
 
 
 class _Typed(click.ParamType["int | str"]):
@@ -191,6 +198,8 @@ def _exchange(line: dict[str, Any], command: Command, message: Message) -> int:
 async def _send(line: dict[str, Any], message: Message) -> Answer:
     from sacbus.mother.superstepper import SuperStepper
 
+    speaks, advice = _MODES[line["nine"]]
+    await check_spoken(line["link"], speaks, advice)
     connected = SuperStepper.connect(line["link"], baud=line["baud"], nine=line["nine"])
     async with connected as master:
         return await master.send(line["address"], message)
