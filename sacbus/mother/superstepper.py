@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import Final
+from typing import Final, runtime_checkable
 from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
@@ -45,7 +45,15 @@ from sacbus.wire.superstepper import (
     decode_status,
 )
 
-__all__ = ["BadChecksum", "Hosted", "Nak", "NoReply", "SuperStepper", "SuperStepperError"]
+__all__ = [
+    "BadChecksum",
+    "Hosted",
+    "Hosting",
+    "Nak",
+    "NoReply",
+    "SuperStepper",
+    "SuperStepperError",
+]
 
 #: RAM 6 and 7.
 _STATUS: Final = 6
@@ -101,6 +109,14 @@ class Hosted(Contract):
     def bus(self) -> _Line: ...
 
     def port(self, hear: Callable[[bytes], None]) -> _Port: ...
+
+
+@runtime_checkable
+class Hosting(Contract):
+    """What has such a bus: a bus in a test is one."""
+
+    @property
+    def hosted(self) -> Hosted: ...
 
 
 class SuperStepper:
@@ -163,11 +179,14 @@ class SuperStepper:
                 master.lose(f"the line was closed, {link}, connect again")
 
     @classmethod
-    def on(cls, bus: Hosted) -> SuperStepper:
+    def on(cls, bus: Hosted | Hosting) -> SuperStepper:
         """The master on a bus in this process, at no distance from its line; closed with it.
 
-        BadRequest where another protocol is spoken: these bytes mean something else there.
+        In a test that is ``bus``. BadRequest where another protocol is spoken: these bytes mean
+        something else there.
         """
+        if isinstance(bus, Hosting):
+            bus = bus.hosted
         spoken = bus.bus.protocol.name
         if spoken not in SPEAKS:
             raise BadRequest(
