@@ -77,7 +77,16 @@ WRONG: list[tuple[str, str]] = [
     ("3 move-steps --speed 9", "expected STEPS behind move-steps, got nothing"),
     ("3 move-steps 5", "expected --speed with a number from 0 to 65535, got none"),
     ("3 move-steps 5 --speed", "--speed: expected a number from 0 to 65535, got nothing"),
-    ("3 move-steps -5 --speed 9", "move-steps: expected --speed, --rate, --ccw, got '-5'"),
+    (
+        "3 move-steps -5 --speed 9",
+        "steps: expected a number from 0 to 65535, got '-5': steps count up, --ccw turns the other",
+    ),
+    (
+        "3 move-at-speed -5",
+        "speed: expected a number from 0 to 65535, got '-5': a speed has no sign, --ccw turns the",
+    ),
+    ("3 write 0 -5", "byte: expected a number from 0 to 255, got '-5'"),
+    ("3 move-steps 5 -x --speed 9", "move-steps: expected --speed, --rate, --ccw, got '-x'"),
     ("3 move-steps 65536 --speed 9", "steps: expected a number from 0 to 65535, got '65536'"),
     ("3 home --speed x", "--speed: expected a number from 0 to 65535, got 'x'"),
     ("3 home --speed 9 --rate quick", "--rate: expected fast, medium or slow, got 'quick'"),
