@@ -131,7 +131,8 @@ class SuperStepper:
 
     All methods raise :class:`Nak`, :class:`NoReply`, :class:`BadChecksum`,
     :class:`~sacbus.mother.LineLost`, and :class:`~sacbus.mother.BadRequest` for what cannot be
-    sent. Speeds are the module's values, 1 to 65 535: larger is slower.
+    sent. Speeds are the module's values, 1 to 65 535: larger is slower. ``rate`` and ``decay`` are
+    of the types Rate and Decay of :mod:`sacbus.wire.superstepper`.
     """
 
     def __init__(
@@ -267,8 +268,8 @@ class SuperStepper:
     async def microsteps(self, address: int, per_step: int, decay: Decay = Decay.FAST) -> None:
         """Opcode 3: 1, 2, 4 or 8 microsteps per step."""
         if per_step not in (1, 2, 4, 8):
-            raise BadRequest(f"microsteps: expected 1, 2, 4 or 8 per step, got {per_step}")
-        await self.send(address, Microsteps(per_step.bit_length() - 1, decay))
+            raise BadRequest(f"microsteps: expected 1, 2, 4 or 8 per step, got {per_step!r}")
+        await self.send(address, Microsteps((1, 2, 4, 8).index(per_step), decay))
 
     async def stop(self, address: int, *, decelerate: bool = True, enabled: bool = True) -> None:
         """Opcode 4. ``enabled`` False: then without current."""
