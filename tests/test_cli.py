@@ -115,7 +115,21 @@ WRONG = [
     (["serve", "--nodes", ""], 2, "expected addresses like 10-19,85, got ''"),
     (["serve", "--nodes", "9" * 5_000], 2, "expected addresses"),
     (["serve", "--nodes", "10-12,11"], 2, "expected each address once, got 11 twice"),
-    (["serve", "--baud", "12"], 2, "12 is not in the range"),
+    (
+        ["serve", "--baud", "12"],
+        2,
+        "'--baud': expected a whole number from 300 to 4000000, got '12', see",
+    ),
+    (
+        ["calibrate", "x", "10", "--rpm", "61.5"],
+        2,
+        "'--rpm': expected a whole number from 1 to 10000, got '61.5', see",
+    ),
+    (
+        ["diff", "a", "b", "--most", "few"],
+        2,
+        "'--most': expected a whole number of 1 or more, got 'few', see",
+    ),
     (["serve", "--speed", "0"], 2, "not in the range"),
     (["serve", "--set", "ustep"], 2, "expected NAME=VALUE, got 'ustep'"),
     (["serve", "--set", "ustep=9", "--ephemeral"], 1, "expected a whole number from 0 to 7, got 9"),

@@ -471,6 +471,47 @@ def test_a_served_bus_is_played_on_over_its_pty(file: Path) -> None:
     assert f"--link {bus.link}</pre>" in text
 
 
+SPOKEN = {
+    "sac": ('[[bus]]\n[[bus.nodes]]\naddress = 4\n[[step]]\nsend = "4m400"\n', ["--nodes", "4"]),
+    "superstepper": (
+        (
+            '[[bus]]\n[[bus.nodes]]\naddress = 4\nkind = "ss-mst67"\n'
+            '[[step]]\nsend = "4 move-steps 400 --speed 4000"\n'
+        ),
+        ["--kind", "ss-mst67", "--nodes", "4", "--baud", "9600"],
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("ours", "theirs", "commands"),
+    [
+        ("sac", "superstepper", "a SAC's commands"),
+        ("superstepper", "sac", "messages of superstepper"),
+    ],
+)
+def test_a_line_of_another_protocol_is_refused_before_a_byte_goes_out(
+    file: Path, capsys: Captured, ours: str, theirs: str, commands: str
+) -> None:
+    file.write_text(SPOKEN[ours][0])
+    tape = file.with_name("tape.jsonl")
+    with served("--ephemeral", *SPOKEN[theirs][1], "--record", str(tape)) as bus:
+        assert run(["run", str(file), "--link", bus.link]) == 1
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert err == (
+            f"error: this line speaks {theirs}, to which {commands} mean something else, "
+            f"{bus.link}, take a master of that protocol: nothing was sent\n"
+        )
+        file.write_text(SPOKEN[theirs][0])
+        assert run(["run", str(file), "--link", bus.link]) == 0
+        bus.send_signal(signal.SIGTERM)  # it writes its recording to the end
+    with tape.open(encoding="utf-8") as lines:
+        said = [one for one in map(json.loads, lines) if one.get("is") == "sent"]
+    assert len(said) == 2, said  # what the one that fits has said, and the node's answer
+
+
 @pytest.mark.slow
 def test_ctrl_c_ends_a_long_one(file: Path) -> None:
     file.write_text(

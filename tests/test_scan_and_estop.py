@@ -131,7 +131,7 @@ def test_what_estop_puts_on_the_line_is_s_three_times(tmp_path: Path) -> None:
             assert listening.read(21) == bytes.fromhex("02 00 01 53 03 39 00") * 3
 
 
-@pytest.mark.parametrize("command", [["estop"], ["scan", "--nodes", "4-6"], ["send"]])
+@pytest.mark.parametrize("command", [["estop"], ["scan", "--nodes", "4-6"], ["send"], ["terminal"]])
 def test_a_bus_of_another_protocol_is_refused_before_a_byte_goes_out(
     capsys: Captured, modules: Sacbus, command: list[str]
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -85,16 +86,37 @@ def test_another_rate_behind_the_command_is_the_lines(link: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "told"),
     [
-        (("32", "status"), 2, "32 is not in the range 0<=x<=31"),
+        (("32", "status"), 2, "'ADDRESS': expected a whole number from 0 to 31, got '32'"),
+        (("status",), 2, "'ADDRESS': expected a whole number from 0 to 31, got 'status'"),
+        (("3", "move-step", "1600"), 2, "No such command 'move-step', did you mean 'move-steps'?"),
+        (("3", "halt"), 2, "No such command 'halt', expected move-at-speed, move-steps, home, "),
+        (
+            ("3", "move-steps", "-1600", "--speed", "2500"),
+            2,
+            "'STEPS': expected a number from 0 to 65535, got '-1600': steps count up, --ccw turns",
+        ),
+        (("3", "write", "1", "-1"), 2, "'BYTE': expected a number from 0 to 255, got '-1'"),
+        (("3", "stop", "-1"), 2, "unexpected extra argument"),
+        (
+            ("3", "--speed", "2500", "move-steps", "400"),
+            2,
+            "--speed is an option of a command, expected behind its name, as in 3 move-steps 400 ",
+        ),
+        (("3", "--ccw", "move-steps", "400"), 2, "--ccw is an option of a command, expected"),
+        (("3", "--rate=slow", "move-steps", "400"), 2, "--rate is an option of a command, expect"),
         (("3", "read", "256"), 2, "expected a number from 0 to 255, got '256'"),
         (("3", "read", "x"), 2, "expected a number from 0 to 255, got 'x'"),
         (("3", "read", "0", "--word", "--eeprom"), 2, "leave --word or --eeprom out"),
         (("3", "microsteps", "3"), 2, "expected 1, 2, 4 or 8, got '3'"),
         (("3", "move-steps", "5"), 2, "Missing option '--speed'"),
         (("3", "status", "--baud"), 2, "Option '--baud' requires an argument"),
-        (("3", "status", "--baud", "fast"), 2, "Invalid value for '--baud': 'fast'"),
+        (
+            ("3", "status", "--baud", "fast"),
+            2,
+            "'--baud': expected a whole number from 300 to 4000000, got 'fast'",
+        ),
         (("3", "stop", "--jsn"), 2, "No such option '--jsn'"),
-        (("--speed", "5", "3", "stop"), 2, "No such option '--speed'"),
+        (("--sped", "5", "3", "stop"), 2, "No such option '--sped'"),
     ],
 )
 def test_mistakes_are_told_in_one_line(
@@ -110,4 +132,25 @@ def test_a_line_that_cannot_be_had_is_told(link: str) -> None:
     status, _, error = ss("/no/such/port", "3", "status")
     assert status == 1
     assert error.startswith("error: cannot open the line (no such file), /no/such/port")
-    assert ss("--nine", link, "3", "status")[2].startswith("error: no ninth bits there")
+    master, slave = os.openpty()
+    assert ss("--nine", os.ttyname(slave), "3", "status")[2].startswith(
+        "error: no ninth bits there"
+    )
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_line_that_speaks_something_else_is_refused_before_a_byte_goes_out(link: str) -> None:
+    def refused(spoken: str, mine: str, where: str, advice: str) -> tuple[int, str, str]:
+        what = f"this line speaks {spoken}, to which messages of {mine} mean something else"
+        return 1, "", f"error: {what}, {where}, {advice}: nothing was sent"
+
+    plain, nine = "superstepper", "superstepper-9"
+    assert ss("--nine", link, "3", "stop") == refused(plain, nine, link, "leave --nine out")
+    with served("--ephemeral", "--nodes", "10") as sacs:
+        advice = "take a master of that protocol"
+        assert ss(sacs.link, "10", "stop") == refused("sac", plain, sacs.link, advice)
+    closed = ["--kind", "ss-mst67", "--nodes", "3", "--baud", "9600", "--set", "jmp2=closed"]
+    with served("--ephemeral", *closed) as modules:
+        there = modules.link
+        assert ss(there, "3", "stop") == refused(nine, plain, there, "add --nine")

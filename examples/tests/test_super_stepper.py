@@ -11,7 +11,7 @@ from sacbus.testing import VirtualBus
 @pytest.mark.sacbus(kind="ss-mst67", nodes="3,4")
 @pytest.mark.asyncio
 async def test_a_module_homes_and_then_moves_by_steps(bus: VirtualBus) -> None:
-    master = SuperStepper.on(bus.hosted)
+    master = SuperStepper.on(bus)
     await master.home(3, speed=10_000)
     await bus.expected(node=3, velocity=-60, state="CRUISE", within="2 s")
 
@@ -30,7 +30,7 @@ async def test_a_module_homes_and_then_moves_by_steps(bus: VirtualBus) -> None:
 @pytest.mark.sacbus(kind="ss-mst67", nodes="3", jmp2="closed")
 @pytest.mark.asyncio
 async def test_in_9_bit_mode_everything_is_the_same(bus: VirtualBus) -> None:
-    master = SuperStepper.on(bus.hosted)
+    master = SuperStepper.on(bus)
     await master.move_at_speed(3, 4_000, accelerate=False)
     await bus.expected(node=3, velocity=150)
     with pytest.raises(NoReply, match="nobody at that address"):

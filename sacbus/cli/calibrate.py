@@ -13,7 +13,7 @@ import click
 
 from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
 from sacbus.cli.mothers_line import mothers_line
-from sacbus.cli.options import baud, verbose
+from sacbus.cli.options import WholeNumber, baud, verbose
 from sacbus.cli.outcomes import failures, told
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ _PARTS: Final = 1_000
 
 @click.command("calibrate")
 @click.argument("link")
-@click.argument("node", type=click.IntRange(4, 255))
+@click.argument("node", type=WholeNumber(4, 255))
 @click.option(
     "--rpm",
-    type=click.IntRange(1, 10_000),
+    type=WholeNumber(1, 10_000),
     default=60,
     show_default=True,
     help="At which velocity; the companion offers 5, 20, 60 and 160.",

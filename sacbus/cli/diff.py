@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 import click
 
-from sacbus.cli.options import verbose
+from sacbus.cli.options import WholeNumber, verbose
 from sacbus.cli.recordings import note_cut_off, opened, span
 
 __all__ = ["diff_command"]
@@ -37,7 +37,7 @@ DIFFERENT = 1
 )
 @click.option(
     "--most",
-    type=click.IntRange(1),
+    type=WholeNumber(1),
     default=20,
     show_default=True,
     help="How many differences to print.",

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from sacbus.cli.options import WholeNumber
+
 if TYPE_CHECKING:
     from sacbus.motion import Drive
 
@@ -35,21 +37,21 @@ def _all_of(*options: Callable[[_F], _F]) -> Callable[[_F], _F]:
 drive_options: Final = _all_of(
     click.option(
         "--ustep",
-        type=click.IntRange(0, 7),
+        type=WholeNumber(0, 7),
         default=0,
         show_default=True,
         help="Microsteps, as a power of two.",
     ),
     click.option(
         "--sprf",
-        type=click.IntRange(1, 65_535),
+        type=WholeNumber(1, 65_535),
         default=200,
         show_default=True,
         help="Full steps per revolution.",
     ),
     click.option(
         "--slow",
-        type=click.IntRange(1, _BYTE),
+        type=WholeNumber(1, _BYTE),
         default=10,
         show_default=True,
         help="RPM up to which there are no ramps.",
@@ -60,14 +62,14 @@ drive_options: Final = _all_of(
 tuning_options: Final = _all_of(
     click.option(
         "--ihd",
-        type=click.IntRange(0, _BYTE),
+        type=WholeNumber(0, _BYTE),
         default=8,
         show_default=True,
         help="Half microseconds taken from every period; 8 is exact.",
     ),
     click.option(
         "--xclk",
-        type=click.IntRange(0, _BYTE),
+        type=WholeNumber(0, _BYTE),
         default=0,
         show_default=True,
         help="Half microseconds added to every period.",

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from sacbus.cli.machine_operator import Operator, ask, check_somebody_there, go_on
-from sacbus.cli.mothers_line import check_spoken
 from sacbus.cli.options import STANDARD, USAGE_STATUS, WrongInput, baud, verbose
 from sacbus.cli.part_program import PartProgram
 from sacbus.cli.recordings import (
@@ -23,6 +22,7 @@ from sacbus.cli.recordings import (
     refuse_missing_directories,
     refuse_shared_files,
 )
+from sacbus.cli.spoken import check_spoken
 from sacbus.fresh import fresh_file
 
 if TYPE_CHECKING:

@@ -11,6 +11,8 @@ from typing import Any
 
 import click
 
+from sacbus.cli.options import WholeNumber
+
 __all__ = ["monitor_command"]
 
 
@@ -18,7 +20,7 @@ __all__ = ["monitor_command"]
 @click.argument("link", required=False)
 @click.option(
     "--baud",
-    type=click.IntRange(300, 4_000_000),
+    type=WholeNumber(300, 4_000_000),
     default=None,
     help="Line rate of a link that no sacbus serves. Default: its kind's own.",
 )
@@ -26,7 +28,7 @@ __all__ = ["monitor_command"]
 @click.option(
     "--node",
     "nodes",
-    type=click.IntRange(0, 255),
+    type=WholeNumber(0, 255),
     multiple=True,
     metavar="ADDRESS",
     help="Show only what is from or to this node, or to all. May be repeated.",

@@ -15,6 +15,7 @@ __all__ = [
     "NO_ANSWER_STATUS",
     "STANDARD",
     "USAGE_STATUS",
+    "WholeNumber",
     "WrongInput",
     "baud",
     "help_unless_asked",
@@ -49,6 +50,25 @@ class WrongInput(click.ClickException):
     exit_code = USAGE_STATUS
 
 
+class WholeNumber(click.IntRange):
+    """click's, whose mistakes are told with what is expected and what came, however it is wrong."""
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401 (text, or a default that is a value already)
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> int:
+        """click's: from text."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            span = f"of {self.min} or more"
+            if self.max is not None:
+                span = f"from {self.min} to {self.max}"
+            self.fail(f"expected a whole number {span}, got {quoted(str(value))}", param, ctx)
+
+
 def shortened(message: str) -> str:
     """A message whose words are not of any length, whatever was given."""
     return _ENDLESS.sub(r"\1…\2", message)
@@ -77,7 +97,7 @@ def help_unless_asked(context: click.Context) -> int | None:
 
 baud = click.option(
     "--baud",
-    type=click.IntRange(300, 4_000_000),
+    type=WholeNumber(300, 4_000_000),
     default=38_400,
     show_default=True,
     help="Line rate.",

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from sacbus.cli.drive import drive_options
-from sacbus.cli.options import WrongInput, verbose
+from sacbus.cli.options import WholeNumber, WrongInput, verbose
 
 __all__ = ["plan_command"]
 
@@ -25,7 +25,7 @@ __all__ = ["plan_command"]
 @click.option(
     "--loop",
     "loops",
-    type=click.IntRange(1, 65_535),
+    type=WholeNumber(1, 65_535),
     default=1,
     show_default=True,
     metavar="N",
@@ -34,7 +34,7 @@ __all__ = ["plan_command"]
 @drive_options
 @click.option(
     "--start-rpm",
-    type=click.IntRange(0, 2**32 - 1),
+    type=WholeNumber(0, 2**32 - 1),
     default=0,
     show_default=True,
     help="Velocity kept from a command before; 0: from rest.",

@@ -8,7 +8,14 @@ from pathlib import Path
 
 import click
 
-from sacbus.cli.options import NO_ANSWER_STATUS, STANDARD, baud, help_unless_asked, verbose
+from sacbus.cli.options import (
+    NO_ANSWER_STATUS,
+    STANDARD,
+    WholeNumber,
+    baud,
+    help_unless_asked,
+    verbose,
+)
 from sacbus.cli.queue_put import put_command
 from sacbus.cli.rows import opened_rows, positions
 
@@ -86,7 +93,7 @@ def get_command(terminal: str, file: str, baud: int, as_json: bool) -> int:
 @click.argument("file", metavar="FILE.csv")
 @click.option(
     "--sprf",
-    type=click.IntRange(1, 65_535),
+    type=WholeNumber(1, 65_535),
     default=200,
     show_default=True,
     help="Full steps per revolution, by which RPM and cycle of the file go together.",

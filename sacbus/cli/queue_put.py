@@ -16,7 +16,7 @@ import click
 
 from sacbus.cli.drive import drive_options, tuned_drive, tuning_options
 from sacbus.cli.mothers_line import mothers_line
-from sacbus.cli.options import WrongInput, baud, verbose
+from sacbus.cli.options import WholeNumber, WrongInput, baud, verbose
 from sacbus.cli.outcomes import failures, told
 from sacbus.cli.rows import Rows, opened_rows, positions, shown_progress
 
@@ -29,7 +29,7 @@ __all__ = ["put_command"]
 
 @click.command("put")
 @click.argument("link")
-@click.argument("node", type=click.IntRange(4, 255))
+@click.argument("node", type=WholeNumber(4, 255))
 @click.argument("file", metavar="FILE.csv")
 @click.option("--save", is_flag=True, help="Have the node save its queue to EEPROM.")
 @click.option("--stream", is_flag=True, help="Run the rows as they are sent, few as they are.")
@@ -51,7 +51,7 @@ __all__ = ["put_command"]
 )
 @click.option(
     "--drift",
-    type=click.IntRange(0, 100_000),
+    type=WholeNumber(0, 100_000),
     default=500,
     show_default=True,
     metavar="PPM",

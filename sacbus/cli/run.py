@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import sys
 import time
@@ -21,6 +22,7 @@ from sacbus.cli.recordings import (
     refuse_shared_files,
 )
 from sacbus.cli.report import Report
+from sacbus.cli.spoken import check_spoken
 from sacbus.fresh import fresh_file
 
 if TYPE_CHECKING:
@@ -138,6 +140,8 @@ def run_command(
             f"{kept[0]}: expected one scenario of one case, got {len(chosen)}, use -k or --set"
         )
     refuse_missing_directories(outputs)
+    if link is not None:
+        _check_line(link, chosen)
     form = "" if picture is None else picture_form(picture)
     page = None if report is None else Report(report, parameters, _how(seed, real, link, speed))
     recorded = bool(kept) or (page is not None and link is None)
@@ -205,6 +209,14 @@ def _read(
     if mistakes:
         raise ConfigError(list(dict.fromkeys(mistakes)))
     return found
+
+
+def _check_line(link: str, scenarios: Sequence[Scenario]) -> None:
+    """LinkError where LINK is known to speak what one of them does not."""
+    from sacbus.configuration import check
+
+    for protocol in {check(bus).name: None for one in scenarios for bus in one.buses}:
+        asyncio.run(check_spoken(link, protocol))
 
 
 def _played(

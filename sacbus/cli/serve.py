@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from sacbus.cli.options import read_addresses, read_endpoints, read_settings, verbose
+from sacbus.cli.options import WholeNumber, read_addresses, read_endpoints, read_settings, verbose
 from sacbus.cli.recordings import refuse_shared_files
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ __all__ = ["serve_command"]
 @click.option("--rts", is_flag=True, help="Adapters switch their direction by RTS.")
 @click.option(
     "--baud",
-    type=click.IntRange(300, 4_000_000),
+    type=WholeNumber(300, 4_000_000),
     help="Line rate. Default: the protocol's own, 38400 for sac.",
 )
 @click.option(

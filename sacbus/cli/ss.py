@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from sacbus.cli.options import NO_ANSWER_STATUS, verbose
+from sacbus.cli.options import NO_ANSWER_STATUS, WholeNumber, verbose
 from sacbus.cli.outcomes import NAK_STATUS, UNKNOWN_STATUS
+from sacbus.cli.spoken import check_spoken
 
 if TYPE_CHECKING:
     from sacbus.mother.superstepper_words import Command, Word
@@ -19,6 +21,12 @@ __all__ = ["ss_group"]
 
 #: What stands before the words of a command.
 _PLACES: Final = ("LINK", "ADDRESS", "COMMAND")
+
+#: What is spoken without --nine and with it, and what to do where the line speaks the other.
+_MODES: Final = (
+    ("superstepper", {"superstepper-9": "add --nine"}),
+    ("superstepper-9", {"superstepper": "leave --nine out"}),
+)
 
 
 class _Typed(click.ParamType["int | str"]):
@@ -57,6 +65,17 @@ class _Messages(click.Group):
         found = COMMANDS.get(cmd_name)
         return None if found is None else _made(found)
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """click's: the one that is named; it knows none of ours by itself, and so none like it."""
+        name, known = args[0], self.list_commands(ctx)
+        if name not in known and not name.startswith("-"):
+            near = get_close_matches(name, known, 1)
+            meant = f"did you mean {near[0]!r}?" if near else f"expected {', '.join(known)}"
+            ctx.fail(f"No such command {name!r}, {meant}")
+        return super().resolve_command(ctx, args)
+
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """click's: from words, of which the group's own options are taken first."""
         options = {
@@ -74,9 +93,10 @@ class _Messages(click.Group):
                 break
             option = options.get(word.partition("=")[0])
             if option is None:
-                # Before its command one of the command's own is none: click says so.
                 early = word.startswith("-") and len(others) < len(_PLACES)
-                (own if early else others).append(word)
+                if early:
+                    self._refuse_early(word.partition("=")[0], ctx)
+                (own if early else others).append(word)  # of one that is none click says so
                 continue
             own.append(word)
             if not option.is_flag and "=" not in word:
@@ -86,13 +106,34 @@ class _Messages(click.Group):
                 own.append(value)
         return super().parse_args(ctx, own + others)
 
+    def _refuse_early(self, option: str, ctx: click.Context) -> None:
+        """A command's option before the command, which alone tells whether it takes a value."""
+        from sacbus.mother.superstepper_words import COMMANDS
+
+        if any(option == one.name for command in COMMANDS.values() for one in command.options):
+            ctx.fail(
+                f"{option} is an option of a command, expected behind its name, as in "
+                "3 move-steps 400 --speed 10000"
+            )
+
+
+class _Message(click.Command):
+    """A command of the table."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """click's: from words, of which a number below 0 is no option, though no operand either."""
+        from sacbus.mother.superstepper_words import is_negative
+
+        ctx.ignore_unknown_options = any(map(is_negative, args))
+        return super().parse_args(ctx, args)
+
 
 @click.group("ss", cls=_Messages)
 @click.argument("link")
-@click.argument("address", type=click.IntRange(0, 31))
+@click.argument("address", type=WholeNumber(0, 31))
 @click.option(
     "--baud",
-    type=click.IntRange(300, 4_000_000),
+    type=WholeNumber(300, 4_000_000),
     default=9_600,
     show_default=True,
     help="Line rate.",
@@ -129,7 +170,7 @@ def _made(command: Command) -> click.Command:
 
     operands = [click.Argument([word.key], type=_Typed(word)) for word in command.operands]
     options = [_option(word) for word in command.options]
-    return click.Command(
+    return _Message(
         command.name,
         callback=click.pass_obj(said),
         params=[*operands, *options],
@@ -191,6 +232,8 @@ def _exchange(line: dict[str, Any], command: Command, message: Message) -> int:
 async def _send(line: dict[str, Any], message: Message) -> Answer:
     from sacbus.mother.superstepper import SuperStepper
 
+    speaks, advice = _MODES[line["nine"]]
+    await check_spoken(line["link"], speaks, advice)
     connected = SuperStepper.connect(line["link"], baud=line["baud"], nine=line["nine"])
     async with connected as master:
         return await master.send(line["address"], message)

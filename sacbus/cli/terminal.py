@@ -9,6 +9,7 @@ import sys
 import click
 
 from sacbus.cli.options import NO_ANSWER_STATUS, WrongInput, baud, verbose
+from sacbus.cli.spoken import check_spoken
 
 __all__ = ["terminal_command"]
 
@@ -35,6 +36,7 @@ def terminal_command(link: str, baud: int, raw: bool, no_history: bool) -> int:
 
     if sys.stdin is None:  # closed before we were started (`<&-`)
         raise click.UsageError("standard input is closed, give a terminal, a file or a pipe")
+    asyncio.run(check_spoken(link))  # what is typed is for SACs
     try:
         if raw:
             _type_keys(link, baud)

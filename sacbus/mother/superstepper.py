@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import Final
+from typing import Final, runtime_checkable
 from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
@@ -46,7 +46,15 @@ from sacbus.wire.superstepper import (
     decode_status,
 )
 
-__all__ = ["BadChecksum", "Hosted", "Nak", "NoReply", "SuperStepper", "SuperStepperError"]
+__all__ = [
+    "BadChecksum",
+    "Hosted",
+    "Hosting",
+    "Nak",
+    "NoReply",
+    "SuperStepper",
+    "SuperStepperError",
+]
 
 #: RAM 6 and 7.
 _STATUS: Final = 6
@@ -104,6 +112,14 @@ class Hosted(Contract):
     def port(self, hear: Callable[[bytes], None]) -> _Port: ...
 
 
+@runtime_checkable
+class Hosting(Contract):
+    """What has such a bus: a bus in a test is one."""
+
+    @property
+    def hosted(self) -> Hosted: ...
+
+
 class SuperStepper:
     """The master for coroutines; any number of tasks may call, messages go out in that order.
 
@@ -116,7 +132,8 @@ class SuperStepper:
 
     All methods raise :class:`Nak`, :class:`NoReply`, :class:`BadChecksum`,
     :class:`~sacbus.mother.LineLost`, and :class:`~sacbus.mother.BadRequest` for what cannot be
-    sent. Speeds are the module's values, 1 to 65 535: larger is slower.
+    sent. Speeds are the module's values, 1 to 65 535: larger is slower. ``rate`` and ``decay`` are
+    of the types Rate and Decay of :mod:`sacbus.wire.superstepper`.
     """
 
     def __init__(
@@ -164,11 +181,14 @@ class SuperStepper:
                 master.lose(f"the line was closed, {link}, connect again")
 
     @classmethod
-    def on(cls, bus: Hosted) -> SuperStepper:
+    def on(cls, bus: Hosted | Hosting) -> SuperStepper:
         """The master on a bus in this process, at no distance from its line; closed with it.
 
-        BadRequest where another protocol is spoken: these bytes mean something else there.
+        In a test that is ``bus``. BadRequest where another protocol is spoken: these bytes mean
+        something else there.
         """
+        if isinstance(bus, Hosting):
+            bus = bus.hosted
         spoken = bus.bus.protocol.name
         if spoken not in SPEAKS:
             raise BadRequest(
@@ -249,8 +269,8 @@ class SuperStepper:
     async def microsteps(self, address: int, per_step: int, decay: Decay = Decay.FAST) -> None:
         """Opcode 3: 1, 2, 4 or 8 microsteps per step."""
         if per_step not in (1, 2, 4, 8):
-            raise BadRequest(f"microsteps: expected 1, 2, 4 or 8 per step, got {per_step}")
-        await self.send(address, Microsteps(per_step.bit_length() - 1, decay))
+            raise BadRequest(f"microsteps: expected 1, 2, 4 or 8 per step, got {per_step!r}")
+        await self.send(address, Microsteps((1, 2, 4, 8).index(per_step), decay))
 
     async def stop(self, address: int, *, decelerate: bool = True, enabled: bool = True) -> None:
         """Opcode 4. ``enabled`` False: then without current."""

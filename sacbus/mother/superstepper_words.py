@@ -30,7 +30,7 @@ from sacbus.wire.superstepper import (
     decode_status,
 )
 
-__all__ = ["COMMANDS", "Command", "Meaning", "Order", "Word", "meaning", "read_line"]
+__all__ = ["COMMANDS", "Command", "Meaning", "Order", "Word", "is_negative", "meaning", "read_line"]
 
 #: Lines that are kept as read: who polls says the same to each module again and again.
 LINES: Final = 1_024
@@ -43,7 +43,8 @@ _WORD: Final = 0xFFFF
 class Word:
     """An operand or an option of a command: a number up to ``most``, or one of ``choices``.
 
-    Neither: a flag. ``default`` None: it must be given, if it is no flag.
+    Neither: a flag. ``default`` None: it must be given, if it is no flag. ``below``: what is said
+    of a number below 0, which may have been meant for the other direction.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Word:
     most: int | None = None
     choices: tuple[str, ...] = ()
     default: int | str | None = None
+    below: str = ""
 
     @property
     def key(self) -> str:
@@ -81,7 +83,13 @@ class Word:
                 number = -1
             if 0 <= number <= self.most:
                 return number
-        raise ValueError(f"expected {self.expected}, got {quoted(text)}")
+        more = f": {self.below}" if self.below and is_negative(text) else ""
+        raise ValueError(f"expected {self.expected}, got {quoted(text)}{more}")
+
+
+def is_negative(word: str) -> bool:
+    """Whether it is a number below 0, and so no option."""
+    return word.startswith("-") and word[1:].isdecimal()
 
 
 class Meaning(NamedTuple):
@@ -153,6 +161,7 @@ def _status(answer: Answer) -> Meaning:
 _SPEED: Final = Word("--speed", "Half a step's ticks of 250 ns: larger is slower.", _WORD)
 _RATE: Final = Word("--rate", "/ 1, / 8, / 64.", choices=("fast", "medium", "slow"), default="fast")
 _CCW: Final = Word("--ccw", "Counterclockwise.")
+_OTHER_WAY: Final = f"{_CCW.name} turns the other way"
 
 #: All commands, by name; those that move first.
 COMMANDS: Final[Mapping[str, Command]] = {
@@ -162,14 +171,14 @@ COMMANDS: Final[Mapping[str, Command]] = {
             "move-at-speed",
             "Move until something else is said.",
             _move_at_speed,
-            (Word("speed", most=_WORD),),
+            (Word("speed", most=_WORD, below=f"a speed has no sign, {_OTHER_WAY}"),),
             (_RATE, _CCW, Word("--at-once", "Without acceleration.")),
         ),
         Command(
             "move-steps",
             "Move a number of (micro)steps.",
             _move_steps,
-            (Word("steps", most=_WORD),),
+            (Word("steps", most=_WORD, below=f"steps count up, {_OTHER_WAY}"),),
             (_SPEED, _RATE, _CCW),
         ),
         Command(
@@ -293,7 +302,7 @@ def _values(command: Command, words: Sequence[str]) -> dict[str, Any]:
     operands = []
     left = iter(words)
     for given in left:
-        if not given.startswith("-"):
+        if not given.startswith("-") or is_negative(given):
             operands.append(given)
             continue
         name, equals, value = given.partition("=")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from operator import index
 from typing import Final, NamedTuple, assert_never
 
 __all__ = [
@@ -287,13 +288,61 @@ def opcode_of(header: int) -> Opcode:
     return Opcode(_HEADER_OPCODE.get(header))
 
 
+class _Field(NamedTuple):
+    """A value of a message: where it stands there, its name for people, and what it may be."""
+
+    key: str
+    name: str
+    most: int
+    expected: str
+
+
+def _number(key: str, most: int, name: str = "") -> _Field:
+    return _Field(key, name or key, most, f"a whole number from 0 to {most}")
+
+
+def _flags(*keys: str) -> tuple[_Field, ...]:
+    return tuple(_Field(key, key, 1, "True or False") for key in keys)
+
+
+def _member(key: str, kind: type[Rate | Decay]) -> _Field:
+    members = ", ".join(str(one) for one in kind.__members__)
+    return _Field(key, key, len(kind) - 1, f"a {kind.__name__} ({members})")
+
+
+_ADDRESSED: Final = _number("address", ADDRESSES[-1])
+_SPEED: Final = _number("speed", 0xFFFF)
+_RATE: Final = _member("rate", Rate)
+_MEMORY: Final = (_number("address", 0xFF, "place"), *_flags("eeprom"))
+
+#: What is asked of a message before it is made bytes of.
+_FIELDS: Final[dict[type[Message], tuple[_Field, ...]]] = {
+    MoveAtSpeed: (_SPEED, _RATE, *_flags("clockwise", "accelerate")),
+    MoveSteps: (_number("steps", 0xFFFF), _SPEED, _RATE, *_flags("clockwise", "home")),
+    ChangeSpeed: (_SPEED,),
+    Microsteps: (_number("exponent", 3), _member("decay", Decay)),
+    Stop: _flags("decelerate", "enabled"),
+    Expanded: (),
+    Write: (*_MEMORY, _number("data", 0xFF, "byte")),
+    Read: (*_MEMORY, *_flags("word")),
+}
+
+
+def _check(field: _Field, value: object) -> None:
+    try:
+        fits = 0 <= index(value) <= field.most  # type: ignore[arg-type]  # what is none is refused
+    except TypeError:
+        fits = False
+    if not fits:
+        raise ValueError(f"{field.name}: expected {field.expected}, got {value!r}")
+
+
 def encode(address: int, message: Message) -> bytes:
-    """The bytes of a message; ValueError for an address or a value that it has no room for."""
+    """The bytes of a message; ValueError, naming it, for a value that it has no room for."""
+    _check(_ADDRESSED, address)
+    for field in _FIELDS[type(message)]:
+        _check(field, getattr(message, field.key))
     opcode, operands = _operands(message)
-    if address not in ADDRESSES:
-        raise ValueError(f"address: expected 0 to {ADDRESSES[-1]}, got {address}")
-    if any(not 0 <= byte <= 0xFF for byte in operands):
-        raise ValueError(f"expected words of 16 bits and bytes of 8, got {message}")
     header = _HEADER_ADDRESS.put(address) | _HEADER_OPCODE.put(opcode)
     return bytes((header, *operands))
 
@@ -309,8 +358,6 @@ def _operands(message: Message) -> tuple[Opcode, tuple[int, ...]]:
         case ChangeSpeed(speed):
             return Opcode.CHANGE_SPEED, _word(speed)
         case Microsteps():
-            if not 0 <= message.exponent <= 3:
-                raise ValueError(f"microsteps: expected 2**0 to 2**3, got 2**{message.exponent}")
             return Opcode.MICROSTEPS, (message.byte,)
         case Stop(decelerate, enabled):
             how = _STOP_DECELERATE.put(decelerate) | _STOP_ENABLE.put(enabled)

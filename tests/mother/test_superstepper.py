@@ -92,6 +92,55 @@ def test_a_bus_of_another_protocol_is_refused() -> None:
     virtually(session())
 
 
+WRONG: list[tuple[str, dict[str, Any], str]] = [
+    (
+        "move_steps",
+        {"steps": 99_999, "speed": 1},
+        "steps: expected a whole number from 0 to 65535, got 99999",
+    ),
+    (
+        "move_steps",
+        {"steps": -1, "speed": 1},
+        "steps: expected a whole number from 0 to 65535, got -1",
+    ),
+    (
+        "move_steps",
+        {"steps": 1, "speed": 1.5},
+        "speed: expected a whole number from 0 to 65535, got 1.5",
+    ),
+    (
+        "move_at_speed",
+        {"speed": 9, "rate": "quick"},
+        "rate: expected a Rate (FAST, MEDIUM, SLOW, NONE), got 'quick'",
+    ),
+    ("home", {"speed": 9, "rate": 4}, "rate: expected a Rate (FAST, MEDIUM, SLOW, NONE), got 4"),
+    (
+        "microsteps",
+        {"per_step": 8, "decay": "slow"},
+        "decay: expected a Decay (FAST, MIXED, MIXED_TOO, SLOW), got 'slow'",
+    ),
+    ("stop", {"enabled": "no"}, "enabled: expected True or False, got 'no'"),
+    ("read", {"place": 256}, "place: expected a whole number from 0 to 255, got 256"),
+    ("write", {"place": 1, "byte": None}, "byte: expected a whole number from 0 to 255, got None"),
+    ("status", {"address": 32}, "address: expected a whole number from 0 to 31, got 32"),
+]
+
+
+@pytest.mark.parametrize(("method", "arguments", "told"), WRONG)
+def test_an_argument_that_cannot_be_sent_is_named(
+    method: str, arguments: dict[str, Any], told: str
+) -> None:
+    async def session() -> None:
+        async with hosted() as bus:
+            given = {"address": 3, **arguments}
+            with pytest.raises(BadRequest) as wrong:
+                await getattr(SuperStepper.on(bus), method)(**given)
+            assert str(wrong.value) == f"module {given['address']}: {told}"
+            assert not bus.snapshot(3).counters["messages"]
+
+    virtually(session())
+
+
 def test_a_call_that_is_cancelled_leaves_the_line_to_others() -> None:
     async def session() -> None:
         async with hosted() as bus:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
@@ -77,7 +80,16 @@ WRONG: list[tuple[str, str]] = [
     ("3 move-steps --speed 9", "expected STEPS behind move-steps, got nothing"),
     ("3 move-steps 5", "expected --speed with a number from 0 to 65535, got none"),
     ("3 move-steps 5 --speed", "--speed: expected a number from 0 to 65535, got nothing"),
-    ("3 move-steps -5 --speed 9", "move-steps: expected --speed, --rate, --ccw, got '-5'"),
+    (
+        "3 move-steps -5 --speed 9",
+        "steps: expected a number from 0 to 65535, got '-5': steps count up, --ccw turns the other",
+    ),
+    (
+        "3 move-at-speed -5",
+        "speed: expected a number from 0 to 65535, got '-5': a speed has no sign, --ccw turns the",
+    ),
+    ("3 write 0 -5", "byte: expected a number from 0 to 255, got '-5'"),
+    ("3 move-steps 5 -x --speed 9", "move-steps: expected --speed, --rate, --ccw, got '-x'"),
     ("3 move-steps 65536 --speed 9", "steps: expected a number from 0 to 65535, got '65536'"),
     ("3 home --speed x", "--speed: expected a number from 0 to 65535, got 'x'"),
     ("3 home --speed 9 --rate quick", "--rate: expected fast, medium or slow, got 'quick'"),
@@ -132,6 +144,31 @@ def test_an_answer_says_what_its_command_has_asked() -> None:
     assert told("status", Answer(3, value=both.byte)) == "busy, changing speed"
     fields = COMMANDS["status"].meaning(Answer(3, value=both.byte)).fields
     assert fields == {"status": {"busy": True, "home_complete": False, "changing_speed": True}}
+
+
+def test_the_page_lists_all_that_answers_say() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "superstepper.md").read_text(encoding="utf-8")
+    rows = {
+        name: cell
+        for names, cell in re.findall(r"^\| (`[a-z`, -]+`) \| (.*) \|$", page, re.MULTILINE)
+        for name in re.findall(r"`(.+?)`", names)
+        if name in COMMANDS
+    }
+    assert set(rows) == set(COMMANDS)
+    told = {name: re.findall(r"`(.+?)`", cell) for name, cell in rows.items()}
+
+    def says(name: str, value: int) -> str:
+        return COMMANDS[name].meaning(Answer(3, value=value)).words
+
+    statuses = [says("status", status) for status in range(8)]
+    assert {word for one in statuses for word in one.split(", ")} == {*told["status"][:-1]}
+    assert statuses[-1] == told["status"][-1]
+    for name in ("read", "steps-run"):
+        assert {says(name, int(one.split()[0])) for one in told[name]} == {*told[name]}
+    for name in COMMANDS.keys() - {"status", "read", "steps-run"}:
+        assert [says(name, 0)] == told[name]
+    both = Answer(3, framing=True, overrun=True)
+    assert f"`(it has seen: {', '.join(both.flags)})`" in page
 
 
 def test_a_word_of_a_command_is_a_number_a_choice_or_a_flag() -> None:

@@ -200,7 +200,7 @@ def test_without_matplotlib_one_line_says_what_to_install(
         (["m200", "--pulses", "a.txt"], "CSV or for numpy, a.txt, give a name that ends in .csv"),
         (["m", "--pulses", "a.csv"], "never ends cannot be written"),
         (["m", "m2"], "'m2' would never run, command 2"),
-        (["m2", "--loop", "0"], "'--loop': 0 is not in the range 1<=x<=65535"),
+        (["m2", "--loop", "0"], "'--loop': expected a whole number from 1 to 65535, got '0'"),
         (["--frob"], "see sacbus plan --help"),
     ],
     ids=lambda one: " ".join(one) if isinstance(one, list) else "",

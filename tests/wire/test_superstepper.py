@@ -117,14 +117,14 @@ def test_nothing_is_no_message() -> None:
 @pytest.mark.parametrize(
     ("address", "message", "why"),
     [
-        (32, Expanded(), "address: expected 0 to 31, got 32"),
+        (32, Expanded(), "address: expected a whole number from 0 to 31, got 32"),
         (-1, Expanded(), "address"),
-        (3, ChangeSpeed(0x10000), "words of 16 bits"),
-        (3, ChangeSpeed(-1), "words of 16 bits"),
-        (3, MoveSteps(True, 100, 0x10000), "words of 16 bits"),
-        (3, Write(0x100, 0), "bytes of 8"),
-        (3, Write(0, 0x100), "bytes of 8"),
-        (3, Microsteps(4), r"expected 2\*\*0 to 2\*\*3, got 2\*\*4"),
+        (3, ChangeSpeed(0x10000), "speed: expected a whole number from 0 to 65535, got 65536"),
+        (3, ChangeSpeed(-1), "speed: .* got -1"),
+        (3, MoveSteps(True, 100, 0x10000), "steps: .* from 0 to 65535, got 65536"),
+        (3, Write(0x100, 0), "place: .* from 0 to 255, got 256"),
+        (3, Write(0, 0x100), "byte: .* from 0 to 255, got 256"),
+        (3, Microsteps(4), "exponent: .* from 0 to 3, got 4"),
     ],
 )
 def test_what_there_is_no_room_for_is_refused(address: int, message: Message, why: str) -> None:
