@@ -112,7 +112,7 @@ class Console:
         self.watch(link.send)
 
     def _show(self, data: bytes) -> None:
-        for show in self._watchers:
+        for show in tuple(self._watchers):
             show(data)
 
     def _keep(self, data: bytes) -> None:

@@ -274,6 +274,8 @@ class _VirtualSelector(selectors.DefaultSelector):
     alone = True
     #: True once the loop has been asked to run something in a thread, which may take its time.
     threads = False
+    #: True once the loop has been asked to mind a signal, which comes by the wake-up pipe.
+    signals = False
 
     def register(
         self, fileobj: FileDescriptorLike, events: int, data: object = None
@@ -290,8 +292,8 @@ class _VirtualSelector(selectors.DefaultSelector):
     def select(self, timeout: float | None = None) -> list[Any]:
         alone = self.alone and not self.threads
         busy = timeout is not None and timeout <= 0
-        # With something to do already the loop learns nothing from its wake-up pipe.
-        ready = [] if alone and busy else super().select(0)
+        # With something to do already the loop learns nothing from its wake-up pipe but of signals.
+        ready = [] if alone and busy and not self.signals else super().select(0)
         if ready or busy:
             return ready
         kernel = self.kernel
@@ -334,7 +336,8 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """Bus time in seconds."""
         return self.kernel.now / SECOND
 
-    # Whatever gives the loop something to do passes through one of these.
+    # Whatever gives the loop something to do passes through one of these, but for descriptors and
+    # signals, which the selector sees.
 
     def call_soon(
         self,
@@ -378,6 +381,11 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         """As asyncio's. Bus time stands still while nothing else is due and a thread works."""
         self._virtual_selector.threads = True
         return super().run_in_executor(executor, func, *args)
+
+    def add_signal_handler(self, sig: int, callback: Callable[..., object], *args: object) -> None:
+        """As asyncio's."""
+        self._virtual_selector.signals = True
+        super().add_signal_handler(sig, callback, *args)
 
 
 class VirtualHost:

@@ -279,10 +279,10 @@ class HostedBus:
     def check_mother(self) -> None:
         """BadRequest where mother does not speak: another protocol is on this line."""
         spoken = self.bus.protocol.name
-        if spoken != SPEAKS:
+        if spoken not in SPEAKS:
             raise BadRequest(
-                f"bus {self.bus.name}: mother speaks {SPEAKS}, expected a bus that does, got "
-                f"{spoken}, take a master of that protocol"
+                f"bus {self.bus.name}: mother speaks {' or '.join(SPEAKS)}, expected a bus that "
+                f"does, got {spoken}, take a master of that protocol"
             )
 
     def mother(self) -> Mother:

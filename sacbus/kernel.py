@@ -81,6 +81,7 @@ class Kernel:
         "_loud",
         "_order",
         "_pausable",
+        "_paused",
         "_quiet",
         "now",
         "ran",
@@ -100,9 +101,11 @@ class Kernel:
         self.ran = 0
         #: Whether an event is running now: what it sets going must wait until it is over.
         self.running = False
-        #: Up to when the run that is under way goes, and whether :meth:`pause` may end it.
+        #: Up to when the run that is under way goes, and whether :meth:`pause` may end it, or was
+        #: called since the outermost one began.
         self._limit: Ns = start
         self._pausable = False
+        self._paused = False
 
     def at(self, when: Ns, callback: Callable[..., object], *arguments: object) -> Appointment:
         """Have ``callback(*arguments)`` run at ``when``; a time that has passed means now.
@@ -206,6 +209,8 @@ class Kernel:
         loud, quiet = self._loud, self._quiet
         ran = 0
         around = self._limit, self._pausable, self.running
+        if not self.running:
+            self._paused = False
         self._limit, self._pausable, self.running = limit, pausable, True
         try:
             while True:
@@ -223,14 +228,17 @@ class Kernel:
                 callback(*arguments)
         finally:
             self._limit, self._pausable, self.running = around
+            if self._paused and self._pausable:
+                self._limit = self.now  # asked for in a run within this one, which it ends too
             self.ran += ran
         return ran
 
     def pause(self) -> None:
         """End a pausable run behind the present instant: somebody else has something to do.
 
-        Nothing happens outside of one.
+        It ends those that this one is within as well. Nothing happens outside of one.
         """
+        self._paused = True
         if self._pausable:
             self._limit = self.now
 

@@ -154,7 +154,7 @@ class Panel:
         return partial(self._do, stop)
 
     def _done(self, deed: Deed) -> None:
-        for watcher in self._deeds:
+        for watcher in tuple(self._deeds):
             watcher(self.node, deed)
 
     def _tell(self, pin: str, level: int, when: Ns) -> None:

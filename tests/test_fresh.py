@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 from pathlib import Path
 
 import pytest
 
 from sacbus.fresh import fresh_file
+from tests.full_disk import needs_full_device
 
 
 def test_a_file_is_there_when_it_is_whole_and_not_before(tmp_path: Path) -> None:
@@ -45,6 +48,34 @@ def test_an_old_file_is_replaced_and_its_mode_kept(tmp_path: Path) -> None:
         file.write(b"new")
     assert place.read_bytes() == b"new"
     assert place.stat().st_mode & 0o777 == 0o640
+
+
+@needs_full_device
+def test_a_device_without_room_is_named() -> None:
+    def fill() -> None:
+        with fresh_file(Path("/dev/full")) as file:
+            file.write(b"new")
+
+    with pytest.raises(
+        OSError, match=r"^/dev/full: No space left on device, what was written is not"
+    ):
+        fill()
+
+
+def test_a_disk_without_room_leaves_what_was_there_and_the_file_is_named(tmp_path: Path) -> None:
+    place = tmp_path / "result.csv"
+    place.write_bytes(b"old")
+
+    def fill() -> None:
+        with fresh_file(place) as file:
+            file.write(b"new")
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    told = f"^{re.escape(str(place))}: No space left on device, it is left as it was, make room or"
+    with pytest.raises(OSError, match=told):
+        fill()
+    assert place.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [place]
 
 
 def test_through_a_symlink_its_target_is_replaced(tmp_path: Path) -> None:

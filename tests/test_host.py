@@ -581,6 +581,22 @@ def test_a_signal_is_noticed_in_virtual_time() -> None:
     assert run_virtual(Kernel(), main()) == "noticed"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="its loops take no signals")
+def test_a_signal_is_noticed_in_virtual_time_while_there_is_always_something_to_do() -> None:
+    async def main() -> int:
+        loop = asyncio.get_running_loop()
+        came = asyncio.Event()
+        loop.add_signal_handler(signal.SIGUSR1, came.set)
+        os.kill(os.getpid(), signal.SIGUSR1)
+        for turn in range(100_000):
+            if came.is_set():
+                return turn
+            await asyncio.sleep(0)
+        return -1
+
+    assert run_virtual(Kernel(), main()) >= 0
+
+
 def test_what_arrives_at_a_virtual_host_is_taken_in_at_once() -> None:
     kernel = Kernel()
     host = VirtualHost(kernel)

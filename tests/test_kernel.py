@@ -190,20 +190,33 @@ def test_a_pause_ends_a_run_that_allows_it_behind_the_present_instant(
     assert (ran, kernel.now) == (["a", "b", "c", "d"], 10)
 
 
-def test_a_pause_outside_of_a_run_or_of_one_within_another_touches_neither() -> None:
+@pytest.mark.parametrize(("within", "heard"), [(True, []), (False, [5])])
+def test_a_pause_in_a_run_within_another_ends_both_if_the_outer_one_is_pausable(
+    within: bool, heard: list[int]
+) -> None:
     kernel = Kernel()
     ran: list[int] = []
 
     def looks_ahead() -> None:
         kernel.at(2, kernel.pause)
-        kernel.run_due(2)
+        kernel.at(3, ran.append, 3)
+        kernel.run_due(3)
         assert kernel.running
 
     kernel.at(1, looks_ahead)
     kernel.at(5, ran.append, 5)
+    kernel.run_due(9, pausable=within)
+    assert (ran, kernel.running) == ([3, *heard], False)
+
+
+def test_a_pause_outside_of_a_run_ends_no_later_one() -> None:
+    kernel = Kernel()
+    ran: list[int] = []
+    kernel.at(1, ran.append, 1)
+    kernel.at(2, ran.append, 2)
     kernel.pause()
     kernel.run_due(9, pausable=True)
-    assert (ran, kernel.running) == ([5], False)
+    assert (ran, kernel.running) == ([1, 2], False)
 
 
 def test_an_error_comes_out_and_leaves_the_clock_at_its_event_and_the_rest_due() -> None:

@@ -7,6 +7,7 @@ import os
 import re
 import resource
 import signal
+import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from io import BytesIO
@@ -24,7 +25,7 @@ from sacbus.trace.records import Moved, Sent
 from sacbus.wire import encode
 from tests.drawing import without_matplotlib
 from tests.full_disk import needs_full_device, needs_full_disk
-from tests.serving import client, served, until
+from tests.serving import PATIENCE, client, served, until
 from tests.trace.rig import Dump, recorded, two_axes
 
 Captured = pytest.CaptureFixture[str]
@@ -222,6 +223,23 @@ def test_an_export_goes_to_standard_output(
     assert err.startswith(f"{beside}: ".encode())
     assert err.count(b"\n") == 1
     assert sorted(tmp_path.iterdir()) == sorted([recording, place, beside])
+
+
+@needs_full_device
+@pytest.mark.parametrize("option", EXPORTS[:4])
+def test_standard_output_without_room_is_named(recording: Path, option: str) -> None:
+    command = [sys.executable, "-m", "sacbus", "export", str(recording), option, "-"]
+    with Path("/dev/full").open("wb") as full:
+        ended = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, text=True, timeout=PATIENCE, check=False
+        )
+    assert (ended.returncode, ended.stderr) == (
+        1,
+        (
+            "error: standard output: No space left on device, what was written is not whole, "
+            "make room there\n"
+        ),
+    )
 
 
 def test_two_exports_do_not_go_to_standard_output(recording: Path, capsys: Captured) -> None:

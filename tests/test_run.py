@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import re
 import shlex
 import signal
@@ -136,7 +137,8 @@ def test_options_that_do_not_go_together_are_refused(
     file: Path, capsys: Captured, arguments: list[str], told: str
 ) -> None:
     assert run(["run", str(file), *arguments]) == 2
-    assert capsys.readouterr().err == f"error: {told}, see sacbus run --help\n"
+    advice = "" if ", see sacbus " in told else ", see sacbus run --help"
+    assert capsys.readouterr().err == f"error: {told}{advice}\n"
 
 
 def test_a_parameter_that_is_not_there_is_a_mistake(file: Path, capsys: Captured) -> None:
@@ -311,6 +313,22 @@ def test_a_recording_that_cannot_be_written_ends_it_with_status_1(
     results = tmp_path / "results.xml"
     assert run(["run", str(file), "--record", "/dev/full", "--junit", str(results)]) == 1
     assert not results.exists()
+
+
+def test_a_recording_into_a_pipe_is_refused_before_anything_is_played(
+    file: Path, tmp_path: Path, capsys: Captured
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        assert run(["run", str(file), "--record", str(pipe)]) == 2
+    finally:
+        os.close(reader)
+    assert capsys.readouterr() == (
+        "",
+        f"error: --record: expected a file, got {pipe}, which is a pipe\n",
+    )
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ Source: manual, "Communications", "Queue", "xRef"; spec, "Two ports, two manners
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, assert_never
 
 from nodes.sac import screens
 from nodes.sac.command import CommandProcessor, Obeyed
@@ -147,7 +147,8 @@ class MessageProcessor:
             self._answer(command)
         elif isinstance(command, SystemLine):
             obey(command, self._board, now)
-        # What is left does nothing: an empty line, a soft op, the end of a mode.
+        elif not isinstance(command, Empty | SoftOp | Leave):  # these do nothing
+            assert_never(command)
 
     def _send_on(self, forward: Forward, now: Ns) -> None:
         to = self.last_source if forward.destination is None else forward.destination

@@ -47,12 +47,12 @@ _FOR_EVER: Final[Ns] = 2**63
 #: What arrives of bytes at a wrong rate: always others, and never one that begins or ends a packet.
 _GARBLED: Final = bytes((byte ^ 0x55) | 0x80 for byte in range(256))
 
-#: The device's times by body length: every packet asks for two of them.
-_SIZES: Final = range(MAX_BODY + 1)
 # The members of an Enum are slow to look up.
 _UNCHECKED: Final = Verdict.UNCHECKED
 _WRONG: Final = Verdict.WRONG
 
+#: The device's times by body length: every packet asks for two of them.
+_SIZES: Final = range(MAX_BODY + 1)
 _AFTER_NUL: Final = [turnaround(size, nul_follows=True) for size in _SIZES]
 _AFTER_TRIGGER: Final = [turnaround(size, nul_follows=False) for size in _SIZES]
 _ENABLED_BEFORE: Final = [enable_lead(size) for size in _SIZES]

@@ -103,7 +103,7 @@ class Bus:
         """Take a report from a node; this is what a kind's ``create`` is given."""
         self.reports.append(report)
         self.report_counts[report.kind.value] += 1
-        for watcher in self.report_watchers:
+        for watcher in tuple(self.report_watchers):
             watcher(report)
 
     def add(self, node: Node) -> None:

@@ -139,14 +139,14 @@ class Medium:
         on = FaultOn(fault, self, self._faults_ever, through)
         self._faults_ever += 1
         self.faults = [*self.faults, on]
-        for watcher in self.fault_watchers:
+        for watcher in tuple(self.fault_watchers):
             watcher(on)
         return on
 
     def drop_fault(self, on: FaultOn) -> None:
         """What :meth:`FaultOn.off` does; what has begun ends as it began."""
         self.faults = [one for one in self.faults if one is not on]
-        for watcher in self.fault_watchers:
+        for watcher in tuple(self.fault_watchers):
             watcher(on)
 
     def node_at(self, address: int) -> object | None:
@@ -250,7 +250,7 @@ class Medium:
         for owner, listener in self._lanes[sent.lane].listeners:
             if owner is not sender:
                 listener.hear(heard, now)
-        for watcher in self.watchers:
+        for watcher in tuple(self.watchers):
             watcher(sent)
 
     def _arrive(self, sent: Transmission) -> None:
@@ -294,7 +294,7 @@ class Medium:
                 if owner is not sender:
                     listener.hear(heard, now)
         if upto == size:
-            for watcher in self.watchers:
+            for watcher in tuple(self.watchers):
                 watcher(sent)
             return
         sent.to_nodes = upto
@@ -425,7 +425,7 @@ class Medium:
 
     def _end(self, sent: Transmission) -> None:
         """What faults had touched is over."""
-        for watcher in self.watchers:
+        for watcher in tuple(self.watchers):
             watcher(sent)
 
     def _spoilt(self, sent: Transmission, first: int, last: int) -> bytes:

@@ -92,7 +92,7 @@ class Port:
         """Bytes that wait for the line."""
         return len(self._buffer)
 
-    def talk(self, data: bytes, ninth: int | bytes = 0) -> None:
+    def talk(self, data: bytes | bytearray, ninth: int | bytes = 0) -> None:
         """Bytes from outside, arriving now, on a line of ninth bits each with its own.
 
         ``ninth``: one for all, or a 0 or 1 for each.
@@ -101,7 +101,7 @@ class Port:
             return
         if not self._waiting and self._ninth is None and len(data) <= CHUNK and self._free():
             # Nearly always: a packet, all of it, and the line is free.
-            self._until = self._medium.transmit(self, data, self._lane).end
+            self._until = self._medium.transmit(self, bytes(data), self._lane).end
             return
         self._buffer += data
         if self._ninth is not None:

@@ -34,6 +34,7 @@ from sacbus.cli.serve import serve_command
 from sacbus.cli.simad import simad_group
 from sacbus.cli.ss import ss_group
 from sacbus.cli.terminal import terminal_command
+from sacbus.fresh import NO_ROOM
 
 __all__ = ["root", "run"]
 
@@ -98,6 +99,8 @@ def run(arguments: list[str]) -> int:
     except OSError as fault:
         # Links and the state directory say it in full; the system only what and where.
         named = f", {fault.filename}" if fault.filename is not None else ""
+        if fault.errno in NO_ROOM and not named:
+            named = ", what is printed is not whole, make room there"
         return _failed(f"{fault.strerror}{named}" if fault.strerror else str(fault), 1, verbose)
     except Exception as fault:
         if (mistakes := _mistakes(fault)) is not None:
@@ -131,7 +134,8 @@ def _usage(fault: click.ClickException) -> str:
     """Click's message on one line, with what to do at its end."""
     text = " ".join(fault.format_message().split()).rstrip(".")
     context = getattr(fault, "ctx", None)
-    if isinstance(fault, click.UsageError) and context is not None:
+    advised = ", see sacbus " in text
+    if isinstance(fault, click.UsageError) and context is not None and not advised:
         return f"{text}, see {context.command_path} --help"
     return text
 

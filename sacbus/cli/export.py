@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 import click
+from click.core import ParameterSource
 
-from sacbus.cli.options import WrongInput, read_addresses, verbose
+from sacbus.cli.options import STANDARD, WrongInput, read_addresses, verbose
 from sacbus.cli.recordings import (
-    STANDARD,
     fresh_or_standard,
     fresh_text,
     note_cut_off,
@@ -131,6 +131,13 @@ def export_command(
         "--pcap": pcap,
         "--plot": picture,
     }
+    if picture is None and (xy is not None or nodes):
+        raise click.UsageError(f"{'--nodes' if nodes else '--xy'}: expected only with --plot")
+    if every == 0:
+        raise click.BadParameter("expected a time above 0, got '0'", param_hint="--every")
+    given = click.get_current_context().get_parameter_source("every")
+    if positions is None and given is not ParameterSource.DEFAULT:
+        raise click.UsageError("--every: expected only with --positions")
     if all(path is None for path in outputs.values()):
         raise click.UsageError(
             "nothing to write: give --vcd, --csv, --positions, --pcap or --plot a file"
@@ -145,12 +152,8 @@ def export_command(
             "--pcap - writes bytes that are not for a terminal, "
             "pipe them to a program (| wireshark -k -i -) or give --pcap a file"
         )
-    if picture is None and (xy is not None or nodes):
-        raise click.UsageError(f"{'--nodes' if nodes else '--xy'}: expected only with --plot")
     if xy is not None and nodes:
         raise click.UsageError("expected --nodes or --xy, got both")
-    if every == 0:
-        raise click.BadParameter("expected a time above 0, got '0'", param_hint="--every")
     refuse_shared_files(
         {option: path for option, path in outputs.items() if option not in standard}, [recording]
     )

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from sacbus.cli.machine_operator import Operator, ask, check_somebody_there, go_on
-from sacbus.cli.options import USAGE_STATUS, WrongInput, baud, verbose
-from sacbus.cli.part_program import STANDARD, PartProgram
+from sacbus.cli.options import STANDARD, USAGE_STATUS, WrongInput, baud, verbose
+from sacbus.cli.part_program import PartProgram
 from sacbus.cli.recordings import (
     fresh_text,
     picture_form,

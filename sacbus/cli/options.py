@@ -13,6 +13,7 @@ from sacbus.config.notation import NotationError, addresses, endpoint, quoted
 __all__ = [
     "INTERRUPTED",
     "NO_ANSWER_STATUS",
+    "STANDARD",
     "USAGE_STATUS",
     "WholeNumber",
     "WrongInput",
@@ -33,6 +34,9 @@ _F = TypeVar("_F", bound=Callable[..., Any])  # whatever parameters a command ha
 INTERRUPTED: Final = 130
 USAGE_STATUS: Final = 2
 NO_ANSWER_STATUS: Final = 4
+
+#: The name of standard input and of standard output, where they stand for a file.
+STANDARD: Final = "-"
 
 
 #: A word of 300 characters or more, and what stands behind it. No message is made of such words,

@@ -9,17 +9,14 @@ from contextlib import ExitStack, contextmanager
 from io import TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, BinaryIO, Final, TextIO
+from typing import TYPE_CHECKING, BinaryIO, TextIO
 
-from sacbus.cli.options import WrongInput, shortened
+from sacbus.cli.options import STANDARD, WrongInput, shortened
 
 if TYPE_CHECKING:
     from sacbus.toolpath import Machine, PathItem
 
-__all__ = ["STANDARD", "PartProgram"]
-
-#: The name of standard input and output.
-STANDARD: Final = "-"
+__all__ = ["PartProgram"]
 
 
 class PartProgram:

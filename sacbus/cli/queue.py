@@ -8,9 +8,16 @@ from pathlib import Path
 
 import click
 
-from sacbus.cli.options import NO_ANSWER_STATUS, WholeNumber, baud, help_unless_asked, verbose
+from sacbus.cli.options import (
+    NO_ANSWER_STATUS,
+    STANDARD,
+    WholeNumber,
+    baud,
+    help_unless_asked,
+    verbose,
+)
 from sacbus.cli.queue_put import put_command
-from sacbus.cli.rows import STANDARD, opened_rows, positions
+from sacbus.cli.rows import opened_rows, positions
 
 __all__ = ["queue_group"]
 

@@ -7,19 +7,18 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, TextIO
+from typing import TYPE_CHECKING, BinaryIO, TextIO
 
 import click
 
-from sacbus.cli.options import WrongInput
-from sacbus.fresh import fresh_file
+from sacbus.cli.options import STANDARD, WrongInput
+from sacbus.fresh import NO_ROOM, fresh_file
 from sacbus.picture_format import PictureError, picture_format
 
 if TYPE_CHECKING:
     from sacbus.trace import Recording
 
 __all__ = [
-    "STANDARD",
     "fresh_or_standard",
     "fresh_text",
     "note_cut_off",
@@ -29,10 +28,6 @@ __all__ = [
     "refuse_shared_files",
     "span",
 ]
-
-
-#: The name of standard input and of standard output, where they stand for a file.
-STANDARD: Final = "-"
 
 
 def span(_ctx: click.Context, _param: click.Parameter, given: str) -> int:
@@ -113,8 +108,15 @@ def fresh_or_standard(path: Path) -> Iterator[BinaryIO]:
             yield file
         return
     sys.stdout.flush()
-    yield sys.stdout.buffer
-    sys.stdout.buffer.flush()
+    try:
+        yield sys.stdout.buffer
+        sys.stdout.buffer.flush()
+    except OSError as fault:
+        if fault.errno not in NO_ROOM:
+            raise
+        raise OSError(
+            f"standard output: {fault.strerror}, what was written is not whole, make room there"
+        ) from fault
 
 
 @contextmanager

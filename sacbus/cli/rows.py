@@ -11,21 +11,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import click
 
-from sacbus.cli.options import WrongInput
+from sacbus.cli.options import STANDARD, WrongInput
 
 if TYPE_CHECKING:
     from sacbus.language import Defaults
     from sacbus.language.queue_file import QueueRow, ReadRow
     from sacbus.plan.entries import Spool
 
-__all__ = ["STANDARD", "Rows", "opened_rows", "positions", "shown_progress"]
-
-STANDARD: Final = "-"
-"""The name of standard input and output."""
+__all__ = ["Rows", "opened_rows", "positions", "shown_progress"]
 
 
 class Rows:

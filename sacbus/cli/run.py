@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile, gettempdir
-from typing import IO, TYPE_CHECKING, BinaryIO, Final, Self
+from typing import TYPE_CHECKING, BinaryIO, Final, Self
 
 import click
 
-from sacbus.cli.options import read_parameters, verbose
+from sacbus.cli.options import STANDARD, WrongInput, read_parameters, verbose
 from sacbus.cli.recordings import (
-    STANDARD,
     fresh_text,
     picture_form,
     refuse_missing_directories,
@@ -67,7 +66,7 @@ SLOW: Final = 1.0
 )
 @click.option(
     "--junit",
-    type=click.File("w", encoding="utf-8", lazy=True),
+    type=click.Path(dir_okay=False, allow_dash=True),
     metavar="FILE",
     help="Write JUnit XML.",
 )
@@ -98,7 +97,7 @@ def run_command(
     record: str | None,
     vcd: str | None,
     pcap: str | None,
-    junit: IO[str] | None,
+    junit: str | None,
     picture: str | None,
     report: str | None,
     as_json: bool,
@@ -117,7 +116,7 @@ def run_command(
 
     if real and link is not None:
         raise click.UsageError("expected --real or --link, got both")
-    if as_json and junit is not None and junit.name == STANDARD:
+    if as_json and junit == STANDARD:
         raise click.UsageError("--json: expected --junit to be a file, got standard output")
     pages = {"--record": record, "--vcd": vcd, "--pcap": pcap, "--plot": picture}
     kept = [option for option, path in pages.items() if path is not None]
@@ -130,7 +129,7 @@ def run_command(
     outputs = {
         **pages,
         "--report": report,
-        "--junit": None if junit is None or junit.name == STANDARD else junit.name,
+        "--junit": None if junit == STANDARD else junit,
     }
     refuse_shared_files(outputs, [one for one in files if one != STANDARD])
     chosen = _read(files, parameters, seed, word, line_only=link is not None)
@@ -152,7 +151,8 @@ def run_command(
         if as_json:
             click.echo(json.dumps({"scenarios": [one.as_json() for one in results]}))
         if junit is not None:
-            junit.write(in_junit(results))
+            with fresh_text(Path(junit)) as xml:
+                xml.write(in_junit(results))
         if page is not None:
             page.write()
 
@@ -244,6 +244,8 @@ def _opened(path: str | None, needed: bool) -> Iterator[BinaryIO | None]:
         return
     if path is not None:
         with Path(path).open("w+b", buffering=0) as file:
+            if not file.seekable():
+                raise WrongInput(f"--record: expected a file, got {path}, which is a pipe")
             yield file
         return
     from sacbus.trace import RecordingCutOff

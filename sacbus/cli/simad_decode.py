@@ -7,11 +7,11 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import click
 
-from sacbus.cli.options import WrongInput, verbose
+from sacbus.cli.options import STANDARD, WrongInput, verbose
 from sacbus.cli.recordings import fresh_text, refuse_missing_directories, refuse_shared_files
 from sacbus.fresh import fresh_file
 
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
     from sacbus.simad import Steps
 
 __all__ = ["decode_command"]
-
-#: The name of standard input and output.
-STANDARD: Final = "-"
 
 
 @click.command("decode")
@@ -95,7 +92,8 @@ def decode_command(
         click.echo(json.dumps(found.as_json()))
     elif table != STANDARD:
         for one in found.as_json()["axes"]:
-            click.echo(f"axis {one['axis']}: {one['steps']} steps to {one['position']}")
+            steps = "1 step" if one["steps"] == 1 else f"{one['steps']} steps"
+            click.echo(f"axis {one['axis']}: {steps} to {one['position']}")
     return 0
 
 

@@ -280,7 +280,9 @@ def _tell(report: Report, driven: Sequence[int], own: Sequence[int | None], as_j
                 f"{one.delay_mean / 1_000:.3f} µs in the mean, {one.delay_rms / 1_000:.3f} µs rms"
             )
         where = f"to {one.position}" + ("" if node is None else f", the node to {node}")
-        click.echo(f"axis {one.axis}: {one.steps} steps {where}, {moved}")
+        click.echo(
+            f"axis {one.axis}: {one.steps} step{'' if one.steps == 1 else 's'} {where}, {moved}"
+        )
     rates = report.as_json()["highest_rate"]
     click.echo(
         f"{report.steps} steps on {report.lines} lines in place of {report.lines_without}, "

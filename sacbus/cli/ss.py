@@ -223,9 +223,9 @@ def _exchange(line: dict[str, Any], command: Command, message: Message) -> int:
             "framing_error": answer.framing,
             "overrun": answer.overrun,
         }
-        click.echo(json.dumps({**report, **command.meaning(answer).fields}))
+        click.echo(json.dumps({**report, **meaning(command, answer).fields}))
     else:
-        click.echo(meaning(command, answer))
+        click.echo(meaning(command, answer).words)
     return 0
 
 

@@ -60,7 +60,10 @@ class MarkingWire(Wire, Protocol):
         """LinkError where this very one cannot."""
 
     def send_marked(self, data: bytes, ninth: bytes) -> object:
-        """Write without waiting, ``ninth`` a 0 or 1 for each byte; one call at a time."""
+        """Write without waiting, ``ninth`` a 0 or 1 for each byte; behind what earlier calls gave.
+
+        Who sends marked bytes sends all of them so: the port has one parity at a time.
+        """
 
 
 class Line:
@@ -94,7 +97,7 @@ class Line:
         wire.check_marking()
 
     def send_marked(self, data: bytes, ninth: bytes) -> None:
-        """As :meth:`send`, with a ninth bit of 0 or 1 for each byte; one call at a time."""
+        """As :meth:`send`, and never beside it, with a ninth bit of 0 or 1 for each byte."""
         if isinstance(self._wire, MarkingWire):
             self._wire.send_marked(data, ninth)
 

@@ -15,7 +15,7 @@ __all__ = ["NINE_BITS", "PARITIES", "runs"]
 #: pyserial's words for a ninth bit of 0 and of 1: space and mark.
 PARITIES: Final = ("S", "M")
 
-#: Bits of a byte on such a line: start, nine, stop.
+#: Bits of a byte on a line with ninth bits: start, nine, stop.
 NINE_BITS: Final = 11
 
 

@@ -28,6 +28,7 @@ import errno
 import os
 import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
 import serial
@@ -133,8 +134,10 @@ class SerialConnection(asyncio.Protocol):
         self._lose = lose
         self._byte_s = _BITS / max(baud, 1)  # one that cannot be had is refused below
         self._path = path
-        #: What writes marked bytes; kept, since a loop forgets what nobody keeps.
-        self._marking: asyncio.Future[None] | None = None
+        #: The thread that writes marked bytes, in the order of the calls; None until there are any.
+        self._marker: ThreadPoolExecutor | None = None
+        #: Marked bytes that may not be out.
+        self._unmarked = 0
         self._failing = False
         self._ended = False
         #: Whether the transport may hold bytes that the system has not taken; its count is dear.
@@ -155,8 +158,8 @@ class SerialConnection(asyncio.Protocol):
         if self._ended:
             return 0
         with contextlib.suppress(OSError):
-            return self._unwritten + self.port.out_waiting
-        return self._unwritten
+            return self._unwritten + self._unmarked + self.port.out_waiting
+        return self._unwritten + self._unmarked
 
     def send(self, data: bytes) -> int:
         """Write without waiting; how many bytes were taken. What BOUND leaves no room for is not.
@@ -194,17 +197,29 @@ class SerialConnection(asyncio.Protocol):
     def send_marked(self, data: bytes, ninth: bytes) -> None:
         """Write with a ninth bit for each byte, in a thread: it waits until one run of them is out.
 
-        One call at a time: whoever sends marked bytes waits for an answer before the next.
+        What an earlier call gave goes before. Not to be mixed with :meth:`send`, whose bytes would
+        have the parity of the moment.
         """
+        if self._ended or self._failing:
+            return
+        if self._marker is None:
+            self._marker = ThreadPoolExecutor(1)
+        self._unmarked += len(data)
         marked = tuple(runs(data, ninth))
-        self._marking = self._loop.run_in_executor(None, self._write_marked, marked)
+        out = self._loop.run_in_executor(self._marker, self._write_marked, marked)
+        out.add_done_callback(lambda _: self._marked(len(data)))
+
+    def _marked(self, size: int) -> None:
+        self._unmarked -= size
 
     def _write_marked(self, marked: Sequence[tuple[str, bytes]]) -> None:
         try:
             for parity, data in marked:
                 self.port.parity = parity
-                self.port.write(data)
-                super(_Port, self.port).flush()
+                rest = data
+                while rest and not (self._ended or self._failing):
+                    rest = rest[self.port.write(rest) :]
+                    super(_Port, self.port).flush()
         except FAULTS as fault:
             if not self._ended:
                 self._loop.call_soon_threadsafe(self._failed, _words(fault))
@@ -224,6 +239,8 @@ class SerialConnection(asyncio.Protocol):
             return 0
         self._ended = True
         unwritten = self._unwritten
+        if self._marker is not None:
+            self._marker.shutdown(wait=False, cancel_futures=True)
         # First, since closing a transport that has something to write only asks for its end.
         self._transport.flush()
         if not self._transport.is_closing():

@@ -14,6 +14,7 @@ from typing import Final
 from sacbus.bus import PLAIN_BITS
 
 from .link import FormattedLink, Link, SerialFormat
+from .marking import NINE_BITS
 
 __all__ = ["Tuning"]
 
@@ -25,9 +26,6 @@ TOLERANCE: Final = 2.5
 #: Asking for the client's rate costs the system a call; after bytes from it, so many packets to it
 #: do without.
 TRUST: Final = 8
-
-#: Bits of a byte on a line with ninth bits; without, PLAIN_BITS.
-NINE_BITS: Final = 11
 
 #: Parities that a line understands: of 8N1 only none, since the parity bit comes where the stop bit
 #: should be; where a ninth bit is, those that give it one value, and none (a second stop bit).

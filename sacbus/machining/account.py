@@ -49,8 +49,9 @@ def account(name: str, program: Checked, course: Course, machined: Machined) -> 
     for index in range(len(course.machine.axes)):
         yield _position(index, course, machined)
     if streamed is not None and streamed.late:
+        often = _counted(streamed.late, "time")
         yield (
-            f"waits      {streamed.late} times the line had not carried the next block yet, "
+            f"waits      {often} the line had not carried the next block yet, "
             f"{streamed.late_by / SECOND:.3f} s in all"
         )
     for text, times in list(machined.reports.items())[:TOLD]:

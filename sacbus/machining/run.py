@@ -111,6 +111,8 @@ async def _on_bus(
     reports: Counter[str] = Counter()
 
     def report(one: Report) -> None:
+        if one.address is None:
+            return  # of the bus, which the programs on it do not have
         text = f"node {one.address}: {one.text}"
         if text in reports or len(reports) < MOST_REPORTS:
             reports[text] += 1

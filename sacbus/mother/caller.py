@@ -261,7 +261,7 @@ class Caller:
         if request is None or answer.dest != MOTHER or answer.src != request.node:
             self.strays += 1
             if answer.dest == MOTHER:
-                for watcher in self.stray_watchers:
+                for watcher in tuple(self.stray_watchers):
                     watcher(answer.src)
             return
         self._outstanding = None

@@ -259,6 +259,9 @@ class Exchanges:
         self, request: _Request, kind: type[SuperStepperError], *, may_repeat: bool = False
     ) -> None:
         self._outstanding = None
+        # Whatever a module has of it is given up by then. Before ``done``, which may ask again.
+        self._pausing = True
+        self._clock.at(self._clock.now + self._patience, self._pause_over)
         if kind is Nak:
             self.statistics[request.address].naks += 1
         else:
@@ -268,9 +271,6 @@ class Exchanges:
             self._waiting.appendleft(request)
         else:
             request.done(kind(request.address, request.message, request.attempts))
-        # Whatever a module has of it is given up by then.
-        self._pausing = True
-        self._clock.at(self._clock.now + self._patience, self._pause_over)
 
     def _pause_over(self) -> None:
         self._pausing = False

@@ -103,17 +103,13 @@ class Mother:
 
     @property
     def caller(self) -> Caller:
-        """The transactions themselves, for whoever waits for them without a loop."""
+        """The transactions themselves: whoever brings bytes of the line has them hear these."""
         return self._caller
 
     @property
     def statistics(self) -> Mapping[int, NodeStatistics]:
         """Counts and round trips by node; address 0 holds the broadcasts."""
         return self._caller.statistics
-
-    def hear(self, data: bytes) -> None:
-        """The link's side: bytes from the line."""
-        self._caller.hear(data)
 
     def lose(self, why: str) -> None:
         """The link's side: the line is gone."""

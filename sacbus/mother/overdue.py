@@ -60,7 +60,7 @@ class Overdue:
     def line_time(self, body: int) -> Ns:
         """What a transaction takes, by the line's own figures, with a line of ``body`` bytes.
 
-        Those of the line as it is asked for: it may need a space.
+        Those of the line as it is asked for, at most MAX_BODY of them: it may need a space.
         """
         return self._line_times[body + _PADDING]
 

@@ -16,8 +16,8 @@ from sacbus.wire import ACK, ETX, MAX_BODY, MOTHER, NUL, STX, encode
 
 __all__ = ["SPEAKS", "checked_address", "safe_body", "safe_packet"]
 
-#: The protocol of what mother sends, as a bus calls it.
-SPEAKS: Final = "sac"
+#: The protocols of what mother sends, as buses call them.
+SPEAKS: Final = ("sac",)
 
 #: CRC bytes that the device takes for "no CRC", a new packet, a second ETX.
 _UNSAFE_CRCS: Final = frozenset((NUL, STX, ETX))

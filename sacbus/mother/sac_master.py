@@ -5,7 +5,7 @@ Owns what becomes of them in the terms of ``masters.py``; the transactions are `
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Final
 
@@ -14,11 +14,10 @@ from sacbus.language.line import quoted
 from sacbus.mother.caller import SLACK, Caller
 from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, NoAnswer, Refused, UnknownOutcome
-from sacbus.mother.masters import Addressed, Came, Speak
+from sacbus.mother.masters import Addressed, Came, MasterBase, Speak
 from sacbus.mother.mother import addressed_line
 from sacbus.mother.outcome import Acknowledged, Outcome, Sent
 from sacbus.mother.request import checked_address, safe_body
-from sacbus.mother.statistics import NodeStatistics
 
 __all__ = ["SAC_MASTER", "SacMaster", "SacMasterKind"]
 
@@ -26,16 +25,8 @@ __all__ = ["SAC_MASTER", "SacMaster", "SacMasterKind"]
 LINES: Final = 1_024
 
 
-class SacMaster:
+class SacMaster(MasterBase[Caller]):
     """Mother's transactions, asked in lines."""
-
-    def __init__(self, caller: Caller) -> None:
-        self._caller = caller
-
-    @property
-    def statistics(self) -> Mapping[int, NodeStatistics]:
-        """What mother remembers of each node."""
-        return self._caller.statistics
 
     def ask(
         self, line: str, done: Callable[[Came], object], *, accept_duplicates: bool = False
@@ -47,21 +38,16 @@ class SacMaster:
             done(_came(to, outcome))
 
         if to.everybody:
-            self._caller.broadcast(body, came)
+            self._transactions.broadcast(body, came)
         else:
-            self._caller.call(to.node, body, came, accept_duplicates=accept_duplicates)
-
-    def hear(self, data: bytes) -> None:
-        """Bytes from the line."""
-        self._caller.hear(data)
-
-    def lose(self, why: str) -> None:
-        """The line is gone."""
-        self._caller.lose(why)
+            self._transactions.call(to.node, body, came, accept_duplicates=accept_duplicates)
 
 
 class SacMasterKind:
     """The entry point ``sac`` of the group ``sacbus.masters``."""
+
+    #: ACK and NAK are all that a SAC answers.
+    answers_in_words = False
 
     def read(self, line: str) -> Addressed:
         """An address, and the command right behind it."""

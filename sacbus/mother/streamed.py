@@ -46,7 +46,10 @@ class Streamed:
         """How far, in words."""
         if not self.blocks:
             return "nothing had moved"
-        lines = f"lines {self.lines[0]} to {self.lines[1]}, " if self.lines[1] else ""
+        first, last = self.lines
+        lines = (
+            "" if not last else f"line {last}, " if first == last else f"lines {first} to {last}, "
+        )
         at = ", ".join(f"{name} {steps}" for name, steps in self.positions.items())
         if not self.over:
             # How much of the block's time is gone, nobody knows.

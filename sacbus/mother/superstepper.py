@@ -14,6 +14,7 @@ from typing import Protocol as Contract
 
 from sacbus.kernel import LineRate, Ns
 from sacbus.links import open_line
+from sacbus.links.marking import NINE_BITS
 from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, MotherError
 from sacbus.mother.exchanges import (
@@ -161,7 +162,7 @@ class SuperStepper:
         takes a real port or one behind RFC 2217. Raises LinkError when it cannot be opened.
         """
         clock = LoopClock(asyncio.get_running_loop())
-        rate = LineRate(baud, 11 if nine else 10)
+        rate = LineRate(baud, NINE_BITS) if nine else LineRate(baud)
         async with open_line(link, baud) as line:
 
             def talk(data: bytes, ninth: bytes) -> None:

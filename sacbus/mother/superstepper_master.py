@@ -10,17 +10,14 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from sacbus.kernel import LineRate, Ns
+from sacbus.links.marking import NINE_BITS
 from sacbus.mother.clock import Clock
 from sacbus.mother.errors import MotherError
 from sacbus.mother.exchanges import SLACK, Answered, BadChecksum, Exchanges, Nak, NoReply
-from sacbus.mother.masters import Addressed, Came, Speak
-from sacbus.mother.statistics import NodeStatistics
+from sacbus.mother.masters import Addressed, Came, MasterBase, Speak
 from sacbus.mother.superstepper_words import Order, meaning, read_line
 
 __all__ = ["SUPER_STEPPER_MASTER", "SuperStepperMaster", "SuperStepperMasterKind"]
-
-#: Bits of a byte where there is a ninth one.
-_NINE: Final = 11
 
 _OUTCOMES: Final[Mapping[type, str]] = {
     Nak: "nak",
@@ -29,16 +26,8 @@ _OUTCOMES: Final[Mapping[type, str]] = {
 }
 
 
-class SuperStepperMaster:
+class SuperStepperMaster(MasterBase[Exchanges]):
     """Messages in order, asked in lines."""
-
-    def __init__(self, exchanges: Exchanges) -> None:
-        self._exchanges = exchanges
-
-    @property
-    def statistics(self) -> Mapping[int, NodeStatistics]:
-        """What has been counted of each module."""
-        return self._exchanges.statistics
 
     def ask(
         self, line: str, done: Callable[[Came], object], *, accept_duplicates: bool = False
@@ -49,21 +38,16 @@ class SuperStepperMaster:
         def came(outcome: Answered | MotherError) -> None:
             done(_came(order, outcome))
 
-        self._exchanges.call(
+        self._transactions.call(
             order.address, order.message, came, accept_duplicates=accept_duplicates
         )
-
-    def hear(self, data: bytes) -> None:
-        """Bytes from the modules."""
-        self._exchanges.hear(data)
-
-    def lose(self, why: str) -> None:
-        """The line is gone."""
-        self._exchanges.lose(why)
 
 
 class SuperStepperMasterKind:
     """The entry points ``superstepper`` and ``superstepper-9`` of the group ``sacbus.masters``."""
+
+    #: Each answer brings a value, or at least what the module has seen of the line.
+    answers_in_words = True
 
     def read(self, line: str) -> Addressed:
         """An address and a command: ``3 stop``. There is no message for all modules."""
@@ -80,7 +64,7 @@ class SuperStepperMasterKind:
         unsent: Callable[[], int] | None = None,
     ) -> SuperStepperMaster:
         """A master on a line, in the mode that its bytes tell."""
-        nine = rate.bits == _NINE
+        nine = rate.bits == NINE_BITS
 
         def talk(data: bytes, ninth: bytes) -> None:
             speak(data, ninth if nine else None)
@@ -92,8 +76,8 @@ class SuperStepperMasterKind:
 def _came(order: Order, outcome: Answered | MotherError) -> Came:
     to = Addressed(order.address, order.text)
     if isinstance(outcome, Answered):
-        words = meaning(order.command, outcome.answer)
-        return Came(to, "ack", outcome.attempts, "" if words == "ACK" else words)
+        said = meaning(order.command, outcome.answer)
+        return Came(to, "ack", outcome.attempts, said.words, said.mere)
     attempts = getattr(outcome, "attempts", 1)
     return Came(to, _OUTCOMES.get(type(outcome), "lost"), attempts, str(outcome))
 

@@ -93,10 +93,14 @@ def is_negative(word: str) -> bool:
 
 
 class Meaning(NamedTuple):
-    """What an answer says: in words, and for programs by name."""
+    """What an answer says: in words, and for programs by name.
+
+    ``mere``: it says that the module has the message, and no more.
+    """
 
     words: str
     fields: Mapping[str, object]
+    mere: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +115,7 @@ class Command:
     message: Callable[..., Message]
     operands: tuple[Word, ...] = ()
     options: tuple[Word, ...] = ()
-    meaning: Callable[[Answer], Meaning] = lambda _answer: Meaning("ACK", {})
+    meaning: Callable[[Answer], Meaning] = lambda _answer: Meaning("ACK", {}, mere=True)
 
 
 def _move_at_speed(speed: int, rate: str, ccw: bool, at_once: bool) -> Message:
@@ -255,10 +259,12 @@ class Order(NamedTuple):
     message: Message
 
 
-def meaning(command: Command, answer: Answer) -> str:
+def meaning(command: Command, answer: Answer) -> Meaning:
     """What an answer says, with what the module has seen of the line."""
-    words = command.meaning(answer).words
-    return words + (f" (it has seen: {', '.join(answer.flags)})" if answer.flags else "")
+    said = command.meaning(answer)
+    if not answer.flags:
+        return said
+    return Meaning(f"{said.words} (it has seen: {', '.join(answer.flags)})", said.fields)
 
 
 @lru_cache(LINES)

@@ -99,10 +99,14 @@ def cautions(
         if shares.accelerates:
             yield Caution(
                 Limit.TARGET,
-                f"{motion.steps} steps are too few for the ramps: {motion.rpm} RPM is not reached",
+                f"{_steps(motion.steps)} too few for the ramps: {motion.rpm} RPM is not reached",
             )
         yield from _of_fall(drive, start_rpm, course)
     yield from _of_motor(drive, start_rpm, course)
+
+
+def _steps(count: int | None) -> str:
+    return "1 step is" if count == 1 else f"{count} steps are"
 
 
 def _of_fastest(period: int, drive: Drive) -> Iterator[Caution]:

@@ -10,7 +10,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Final
 
-from sacbus.bus import Port
+from sacbus.bus import PLAIN_BITS, Port
 from sacbus.bus.transmission import Transmission
 from sacbus.hosted import HostedBus
 from sacbus.kernel import MS, LineRate, Ns
@@ -38,8 +38,9 @@ _WARN: Final = (ReportKind.WARNING, ReportKind.REFUSED, ReportKind.OVERRUN)
 class Bench:
     """One bus under a scenario. Everything is called at the time of ``clock``.
 
-    ``talk`` puts bytes on the line as they are, ``say`` does so with ninth bits; ``unsent`` tells
-    how many of them wait for it. ``hosted`` is None where only the line is there.
+    ``talk`` puts bytes on the line as they are, ``say`` does so with ninth bits; ``unsent``, where
+    it can be known, tells how many of them wait for it. ``slack`` is the master's, for answers.
+    ``hosted`` is None where only the line is there.
     """
 
     def __init__(
@@ -47,20 +48,27 @@ class Bench:
         name: str,
         clock: Clock,
         protocol: Protocol,
+        rate: LineRate,
         talk: Callable[[bytes], None],
-        unsent: Callable[[], int],
-        span: Callable[[int], Ns],
         say: Callable[[bytes, bytes | None], None],
+        *,
+        slack: Ns | None = None,
+        unsent: Callable[[], int] | None = None,
     ) -> None:
         self.name = name
         self.clock = clock
         self.line = Line(protocol)
         self.talk = talk
         self.say = say
-        self.unsent = unsent
-        self.span = span
-        #: Who speaks to the nodes; None where no master of their protocol is installed.
+        self.span = rate.span
+        #: Who speaks to the nodes; None as long as nobody has been asked to.
         self.speaker: Master | None = None
+        self._protocol = protocol
+        self._rate = rate
+        self._slack = slack
+        self._unsent = unsent
+        #: Why the line is gone; None while it is there.
+        self._lost: str | None = None
         self.hosted: HostedBus | None = None
         self.look: Ns = LOOK
         #: By the addresses of the configuration, whatever a node is called by now.
@@ -78,9 +86,20 @@ class Bench:
 
     @property
     def master(self) -> Master:
-        """Who speaks to the nodes."""
-        assert self.speaker is not None, "the rules have looked for a master"
+        """Who speaks to the nodes: made when first asked for, since bytes alone take no master."""
+        if self.speaker is None:
+            kind = find_master(self._protocol.name)
+            assert kind is not None, "the rules have looked for a master"
+            self.speaker = kind.create(
+                self.clock, self.say, self._rate, slack=self._slack, unsent=self._unsent
+            )
+            if self._lost is not None:
+                self.speaker.lose(self._lost)
         return self.speaker
+
+    def unsent(self) -> int:
+        """How many bytes wait for the line; 0 where that cannot be known."""
+        return 0 if self._unsent is None else self._unsent()
 
     def hear(self, data: bytes) -> None:
         """The master hears what nodes say."""
@@ -89,6 +108,7 @@ class Bench:
 
     def lose(self, why: str) -> None:
         """The master's line is gone."""
+        self._lost = why
         if self.speaker is not None:
             self.speaker.lose(why)
 
@@ -155,10 +175,9 @@ def hosted_bench(hosted: HostedBus) -> Bench:
     def say(data: bytes, ninth: bytes | None) -> None:
         port.talk(data, 0 if ninth is None else ninth)
 
-    protocol, span = bus.protocol, bus.rate.span
-    bench = Bench(bus.name, kernel, protocol, port.talk, lambda: port.unsent, span, say)
-    if (kind := find_master(protocol.name)) is not None:
-        bench.speaker = kind.create(kernel, say, bus.rate, unsent=lambda: port.unsent)
+    bench = Bench(
+        bus.name, kernel, bus.protocol, bus.rate, port.talk, say, unsent=lambda: port.unsent
+    )
     _watch(bench, hosted)
     return bench
 
@@ -166,18 +185,21 @@ def hosted_bench(hosted: HostedBus) -> Bench:
 def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
     """A bus in this process, with its master at the far end of one of its links, in real time."""
     kernel, bus = hosted.host.kernel, hosted.bus
-    # The link's end is a pty, which has no ninth bits: bytes with some get on the line beside it.
+    # The link's end is a pty, which has no ninth bits: where there are some, bytes get on the line
+    # beside it, all of them, for a stop bit of 1 stands in that place of a pty's.
     beside = Port(bus.medium, _deaf, latency=0, name="mother")
+    nine = bus.rate.bits > PLAIN_BITS
+
+    def send(data: bytes) -> None:
+        say(data, None)
 
     def say(data: bytes, ninth: bytes | None) -> None:
-        if ninth is None:
-            link.send(data)
+        if nine:
+            hosted.host.arrive(beside.talk, data, 0 if ninth is None else ninth)
         else:
-            hosted.host.arrive(beside.talk, data, ninth)
+            link.send(data)
 
-    bench = Bench(bus.name, kernel, bus.protocol, link.send, lambda: 0, bus.rate.span, say)
-    if (kind := find_master(bus.protocol.name)) is not None:
-        bench.speaker = kind.create(kernel, say, bus.rate, slack=slack)
+    bench = Bench(bus.name, kernel, bus.protocol, bus.rate, send, say, slack=slack)
     _watch(bench, hosted)
     link.start(
         lambda data: hosted.host.arrive(bench.hear, data),
@@ -189,16 +211,14 @@ def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
 def far_bench(
     name: str, clock: Clock, protocol: Protocol, link: Link, rate: LineRate, slack: Ns
 ) -> Bench:
-    """A line at the far end of a link: what comes back is all that can be seen of it."""
+    """A line at the far end of a link: what comes back is all that can be seen of it.
+
+    On a line with ninth bits the link must be one that can mark bytes.
+    """
+    nine = rate.bits > PLAIN_BITS
 
     def send(data: bytes) -> None:
-        link.send(data)
-        said(data, None)
-
-    def said(data: bytes, ninth: bytes | None) -> None:
-        now = clock.now
-        end = now + rate.span(len(data))
-        bench.line.note(Passed(now, end, 0, "mother", data, ninth=ninth))
+        say(data, None)
 
     def hear(data: bytes) -> None:
         now = clock.now
@@ -207,15 +227,17 @@ def far_bench(
         bench.hear(data)
 
     def say(data: bytes, ninth: bytes | None) -> None:
-        if ninth is None:
-            send(data)
-        else:
+        if nine:
+            # All of them: beside marked bytes others would have the parity of the moment.
+            ninth = bytes(len(data)) if ninth is None else ninth
             link.send_marked(data, ninth)
-            said(data, ninth)
+        else:
+            link.send(data)
+        now = clock.now
+        end = now + rate.span(len(data))
+        bench.line.note(Passed(now, end, 0, "mother", data, ninth=ninth))
 
-    bench = Bench(name, clock, protocol, send, lambda: 0, rate.span, say)
-    if (kind := find_master(protocol.name)) is not None:
-        bench.speaker = kind.create(clock, say, rate, slack=slack)
+    bench = Bench(name, clock, protocol, rate, send, say, slack=slack)
     link.start(hear, bench.lose)
     return bench
 

@@ -235,7 +235,7 @@ SEND: Final = (
         "says",
         "a text",
         _is_name,
-        "what each answer must bring, as sacbus ss prints it",
+        "what each answer must say, as sacbus ss prints it; not of a SAC, which says nothing",
         otherwise="anything",
     ),
     Key(

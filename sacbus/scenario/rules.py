@@ -95,8 +95,6 @@ def complaints(scenario: Scenario) -> Iterator[Complaint]:
         what = f"expected a name of its own for each, got {twice[0]!r} twice"
         yield Complaint(None, "bus", what, "name them")
         return
-    for bus in scenario.buses:
-        check(bus)
     rules = _Rules(scenario)
     for index, step in enumerate(scenario.steps):
         for key, what, remedy in rules.of(index, step):
@@ -153,11 +151,12 @@ class _Rules:
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._buses = {bus.name: bus for bus in scenario.buses}
+        #: Checked once each: that looks through all kinds of nodes, and there are many steps.
+        self._spoken = {bus.name: check(bus).name for bus in scenario.buses}
         self._before = predecessors(scenario.steps)
         self._circular = _circular(self._before)
         self._aside: dict[tuple[str, int], Node] = {}
         self._kind = cache(find_kind)
-        self._master = cache(find_master)
 
     def of(self, index: int, step: Step) -> Iterator[_Found]:
         yield from self._times(index, step)
@@ -203,15 +202,24 @@ class _Rules:
             case Send(lines=lines, outcome=outcome) | Poll(lines=lines, outcome=outcome):
                 if not lines:
                     yield "send", "expected one line at least, got none", "give one"
-                spoken = check(bus).name
-                if (master := self._master(spoken)) is None:
+                spoken = self._spoken[bus.name]
+                try:
+                    master = find_master(spoken)
+                except BadRequest as wrong:
+                    yield "send", str(wrong), "or give bytes, as raw"
+                    return
+                if master is None:
                     what = f"expected a bus whose protocol has a master here, got {spoken}"
                     yield "send", what, "install one, or give bytes, as raw"
                     return
+                says = deed.says if isinstance(deed, Send) else None
                 for line in lines:
-                    yield from self._line(bus, master, line, outcome)
-                if isinstance(deed, Send) and deed.says is not None and outcome != "ack":
+                    yield from self._line(bus, master, line, outcome, says)
+                if says is not None and outcome != "ack":
                     yield "says", f"expected only with outcome ack, got {outcome}", "remove it"
+                elif says is not None and not master.answers_in_words:
+                    what = f"expected a protocol whose answers bring words, got {spoken}"
+                    yield "says", what, "remove it"
                 if isinstance(deed, Poll) and deed.every <= 0:
                     yield "every", "expected a time of more than 0, got 0 s", "correct it"
             case Raw(data=data):
@@ -266,7 +274,12 @@ class _Rules:
             yield "lift", what, f"correct it; {words}"
 
     def _line(
-        self, bus: Configuration, master: MasterKind, line: str, outcome: str
+        self,
+        bus: Configuration,
+        master: MasterKind,
+        line: str,
+        outcome: str,
+        says: str | None,
     ) -> Iterator[_Found]:
         try:
             to = master.read(line)
@@ -275,6 +288,9 @@ class _Rules:
         else:
             if not to.everybody and outcome == "ack":
                 yield from self._nodes(bus, (to.node,), "send")
+            elif to.everybody and says is not None and master.answers_in_words:
+                what = f"expected only with lines that are answered, got {line!r} to all"
+                yield "says", what, "remove it"
 
     def _nodes(self, bus: Configuration, nodes: Iterable[int], key: str) -> Iterator[_Found]:
         nodes = tuple(nodes)

@@ -28,7 +28,7 @@ from sacbus.scenario.play import Play
 from sacbus.scenario.result import Result
 from sacbus.scenario.rules import refuse
 from sacbus.scenario.tape import Tape
-from sacbus.scenario.values import Poll, Scenario, Send
+from sacbus.scenario.values import Poll, Raw, Scenario, Send
 from sacbus.trace import RecordingCutOff
 
 __all__ = ["run", "run_on_link", "run_real"]
@@ -149,7 +149,7 @@ async def _far(scenario: Scenario, link: str, progress: Progress | None) -> Resu
     loop = asyncio.get_running_loop()
     async with open_line(link, rate.baud) as line:
         if rate.bits > PLAIN_BITS and any(
-            isinstance(one.does, Send | Poll) for one in scenario.steps
+            isinstance(one.does, Send | Poll | Raw) for one in scenario.steps
         ):
             line.check_marking()
         clock = LoopClock(loop)

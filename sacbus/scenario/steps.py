@@ -270,8 +270,10 @@ class StepReader:
         if not _has(inner, "node", "file"):
             return None
         there = next((one for one in self._buses if not bus or one.name == bus), None)
-        if there is not None and (spoken := check(there).name) != SPEAKS:
-            what = f"expected a bus that speaks {SPEAKS}, as queue files do, got {spoken}"
+        if there is not None and (spoken := check(there).name) not in SPEAKS:
+            what = (
+                f"expected a bus that speaks {' or '.join(SPEAKS)}, as queue files do, got {spoken}"
+            )
             self._findings.add(table.at("queue"), what, "leave it out")
             return None
         nodes = (0,) if inner.get("node") == 0 else self._expected.nodes(inner.get("node"), bus)

@@ -54,8 +54,8 @@ class Send:
 
     Lines are in that master's words. Over when the last one's outcome is known. ``outcome``: what
     each must come to; ``any`` for no matter what. ``accept_duplicates``: repeat after silence even
-    what may then run twice. ``says``: what each answer must bring, in the words of that master:
-    ``at rest``, ``66 (0x42)``.
+    what may then run twice. ``says``: what each answer must say, in the words of that master, if it
+    has any: ``at rest``, ``66 (0x42)``, ``ACK``.
     """
 
     lines: tuple[str, ...]

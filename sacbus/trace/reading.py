@@ -160,7 +160,8 @@ class Recording:
         try:
             yield from _whole_lines(buffer)
         finally:
-            buffer.detach()  # the file is not this one's to close
+            if not self._source.closed:  # as it is when who reads has given up on an error
+                buffer.detach()  # the file is not this one's to close
 
     def _wrong(self, number: int, expected: str, line: bytes) -> RecordingError:
         shown = line[:40].decode("utf-8", "backslashreplace").strip()

@@ -11,6 +11,7 @@ what came last. So what is killed leaves all but the last of it.
 
 from __future__ import annotations
 
+import errno
 import json
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -47,10 +48,10 @@ class RecordingCutOff(OSError):
     """A recording that cannot be written on; its text is a line for users.
 
     ``name``: the file, empty when it has none. ``kept``: up to which bus time all is in it, ns;
-    None: nothing is. ``reason``: the system's word for it.
+    None: nothing is. ``reason``: the system's word for it, and ``errno`` its number.
     """
 
-    def __init__(self, name: str, kept: Ns | None, reason: str) -> None:
+    def __init__(self, name: str, kept: Ns | None, reason: str, number: int | None = None) -> None:
         self.name = name
         self.kept = kept
         self.reason = reason
@@ -61,6 +62,11 @@ class RecordingCutOff(OSError):
             until = f"{kept / SECOND:.6f} s"
             text = f"{what} ends at {until}: {reason}, what came before is kept, record elsewhere"
         super().__init__(text)
+        self.errno = number
+
+    def __reduce__(self) -> tuple[type[RecordingCutOff], tuple[object, ...]]:
+        """How it is copied, and comes out of another process."""
+        return type(self), (self.name, self.kept, self.reason, self.errno)
 
 
 class Recorder:
@@ -112,12 +118,16 @@ class Recorder:
         self._begin(several)
 
     def _begin(self, buses: Sequence[HostedBus]) -> None:
-        for number, bus in enumerate(buses):
-            self._places.append(_Place(self, number, bus))
-            # What it tells at its beginning may be enough to be written.
+        self._places += [_Place(self, number, bus) for number, bus in enumerate(buses)]
+        try:
+            for place in self._places:
+                place.begin()
+                # What it tells at its beginning may be enough to be written, and to be cut off.
+                if self.fault is not None:
+                    break
+        finally:
             if self.fault is not None:
                 self._let_go()
-                return
 
     # ---- what whoever records adds ----
 
@@ -162,7 +172,10 @@ class Recorder:
         self._lines.clear()
         try:
             while data:  # a sink without a buffer may take a part of it
-                data = data[self._sink.write(data) :]
+                taken = self._sink.write(data)
+                if not taken:  # nor does a pipe that does not block, while it is full
+                    raise BlockingIOError(errno.EAGAIN, "it takes nothing at present")
+                data = data[taken:]
             self._sink.flush()
         except OSError as fault:
             self._end(fault)
@@ -173,7 +186,7 @@ class Recorder:
         """Nothing can be written any more: who records and who looks on are told."""
         name = getattr(self._sink, "name", "")
         named = name if isinstance(name, str) else ""  # one without a name has a number
-        self.fault = RecordingCutOff(named, self._kept, fault.strerror or str(fault))
+        self.fault = RecordingCutOff(named, self._kept, fault.strerror or str(fault), fault.errno)
         self.fault.__cause__ = fault
         self._let_go()
         self._first.tell(str(self.fault))
@@ -245,9 +258,14 @@ class _Place:
         #: Those that are no nodes, which must live as long as their identity names them.
         self._talkers: list[object] = []
         self._links = 0
+        self._stop: list[Callable[[], object]] = []
+
+    def begin(self) -> None:
+        """Watch, from now on; a node in motion is told of at once."""
+        hosted = self.hosted
         now = hosted.now()
         bus = hosted.bus
-        self._stop = [
+        self._stop += [
             _watch(bus.medium.watchers, self._sent),
             _watch(bus.medium.fault_watchers, self._faulty),
             _watch(bus.report_watchers, self._told),
@@ -257,8 +275,8 @@ class _Place:
             self._names[id(node)] = str(at.address)
             movement = node.movement
             if movement is not None:
-                movement.watch(partial(self._moved, at.address, at.kind), now)
                 self._stop.append(partial(movement.watch, None, now))
+                movement.watch(partial(self._moved, at.address, at.kind), now)
 
     def let_go(self) -> None:
         """Watch no longer."""

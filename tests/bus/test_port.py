@@ -48,6 +48,16 @@ def test_on_an_idle_line_bytes_start_at_once() -> None:
     assert desk.data == ACK
 
 
+def test_whoever_reuses_a_buffer_once_it_is_said_changes_nothing_on_the_line() -> None:
+    bench = Bench()
+    desk = Desk(bench)
+    said = bytearray(packet("v100"))
+    desk.port.talk(said)
+    said.clear()
+    bench.run()
+    assert desk.data == ACK
+
+
 def test_saying_nothing_is_no_transmission() -> None:
     bench = Bench()
     desk = Desk(bench)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import os
+import threading
 import tty
 from collections.abc import AsyncIterator
 
 import pytest
 import pytest_asyncio
+import serial
 
 from sacbus.links import LinkError
 from sacbus.links.serialport import BOUND, SerialConnection
@@ -194,3 +196,31 @@ async def test_a_failed_opening_leaves_nothing_open(pty: Pty) -> None:
         pty.connect()
     assert open_descriptors() == before
     connection.close()
+
+
+async def test_marked_bytes_of_one_call_are_out_before_those_of_the_next(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pty takes no parity, so what the system is asked for is looked at in pyserial."""
+    connection = pty.connect()
+    asked: list[str] = []
+    threads: set[int] = set()
+    gate = threading.Event()
+
+    def flush(_port: serial.Serial) -> None:
+        assert gate.wait(10)
+        asked.append("out")
+        threads.add(threading.get_ident())
+
+    parity = property(None, lambda _port, parity: asked.append(parity))
+    monkeypatch.setattr(serial.Serial, "parity", parity)
+    monkeypatch.setattr(serial.Serial, "flush", flush)
+    connection.send_marked(b"abc", bytes((1, 0, 0)))
+    connection.send_marked(b"d", bytes((1,)))
+    assert connection.unsent >= len(b"bcd")
+    gate.set()
+    await connection.finish()
+    assert asked == ["M", "out", "S", "out", "M", "out"]
+    assert len(threads) == 1
+    assert pty.read() == b"abcd"
+    assert pty.lost == []

@@ -85,6 +85,28 @@ def test_messages_go_out_one_after_the_other() -> None:
     assert outcomes == wanted
 
 
+def test_who_asks_again_upon_a_failure_has_the_line_after_the_pause() -> None:
+    rig = Rig()
+    rig.weather = ["lost"]
+    outcomes: list[Outcome] = []
+    went: list[int] = []
+
+    def ask_again(outcome: Outcome) -> None:
+        outcomes.append(outcome)
+        failed = rig.bench.now
+        rig.exchanges.call(3, Read(2), outcomes.append)
+        assert len(rig.sent) == 1
+        while len(rig.sent) == 1:
+            assert rig.bench.kernel.run_next()
+        went.append(rig.bench.now - failed)
+
+    rig.exchanges.call(4, MOVE, ask_again)
+    rig.bench.run(100 * MS)
+    assert went == [patience(rig.bench.span(1))]
+    assert isinstance(outcomes[0], NoReply)
+    assert isinstance(outcomes[1], Answered)
+
+
 def test_what_comes_of_messages_is_counted_by_module() -> None:
     rig = Rig()
     rig.weather = ["lost", "cut", "fine", "spoilt", "fine"]

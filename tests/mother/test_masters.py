@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +16,7 @@ from sacbus.mother.sac_master import SAC_MASTER
 from sacbus.mother.superstepper_master import SUPER_STEPPER_MASTER
 from sacbus.node import find_kind, protocols_of
 from sacbus.wire import ack, nak
+from tests.mother.third_party import install
 
 
 def test_each_protocol_of_ours_has_its_master() -> None:
@@ -24,15 +28,26 @@ def test_each_protocol_of_ours_has_its_master() -> None:
     assert find_master("smoke") is None
 
 
+def test_what_is_installed_is_looked_through_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked = 0
+    every = importlib.metadata.Distribution.discover
+
+    def discover(**context: Any) -> Iterable[importlib.metadata.Distribution]:  # noqa: ANN401
+        nonlocal looked
+        looked += 1
+        return every(**context)
+
+    monkeypatch.syspath_prepend("")  # a path that has not been looked through yet
+    monkeypatch.setattr(importlib.metadata.Distribution, "discover", discover)
+    for protocol in ("sac", "superstepper", "sac", "smoke", "smoke"):
+        find_master(protocol)
+    assert looked == 1
+
+
 def test_a_third_partys_master_is_found_no_differently_and_a_broken_one_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    about = tmp_path / "smoke-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: smoke\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text(
-        "[sacbus.masters]\nsmoke = smokesignals:MASTER\nfog = nowhere:MASTER\n"
-    )
+    install(tmp_path, "smoke = smokesignals:MASTER", "fog = nowhere:MASTER")
     (tmp_path / "smokesignals.py").write_text("MASTER = object()\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     assert find_master("smoke") is not None

@@ -36,7 +36,7 @@ def test_a_link_that_is_late_is_measured_once_a_command() -> None:
             kernel = bus.host.kernel
 
             def hear(heard: Heard, _now: int) -> None:
-                kernel.at(kernel.now + 20 * MS, mother.hear, heard.data)
+                kernel.at(kernel.now + 20 * MS, mother.caller.hear, heard.data)
 
             port = Port(bus.bus.medium, hear, latency=0, name="far")
             mother = Mother(kernel, port.talk, slack=100 * MS, arrive=bus.host.arrive)

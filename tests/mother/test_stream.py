@@ -310,7 +310,7 @@ def far_mother(
     kernel = bus.host.kernel
 
     def hear(heard: Heard, _now: int) -> None:
-        kernel.at(kernel.now + late, mother.hear, heard.data)
+        kernel.at(kernel.now + late, mother.caller.hear, heard.data)
 
     def send(data: bytes) -> None:
         kernel.at(kernel.now + late, port.talk, data)
@@ -349,7 +349,9 @@ def test_a_release_that_a_link_holds_up_puts_nobody_out_of_step() -> None:
             free_at = max(free_at + 4 * MS, kernel.now)
             kernel.at(free_at, port.talk, data)
 
-        port = Port(bus.bus.medium, lambda heard, _: mother.hear(heard.data), latency=0, name="far")
+        port = Port(
+            bus.bus.medium, lambda heard, _: mother.caller.hear(heard.data), latency=0, name="far"
+        )
         mother = Mother(kernel, send, slack=100 * MS, arrive=bus.host.arrive)
         await Stream(mother, machine(*NODES)).run(blocks)
         assert positions(bus) == totals(blocks, 3)

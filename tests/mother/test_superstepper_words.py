@@ -130,9 +130,12 @@ def test_the_command_line_takes_the_same_lines(line: str) -> None:
 
 def test_an_answer_says_what_its_command_has_asked() -> None:
     def told(command: str, answer: Answer) -> str:
-        return meaning(COMMANDS[command], answer)
+        return meaning(COMMANDS[command], answer).words
 
     assert told("stop", Answer(3)) == "ACK"
+    assert meaning(COMMANDS["stop"], Answer(3)).mere
+    assert not meaning(COMMANDS["stop"], Answer(3, overrun=True)).mere
+    assert not meaning(COMMANDS["status"], Answer(3)).mere
     assert told("stop", Answer(3, overrun=True)) == "ACK (it has seen: overrun)"
     assert told("read", Answer(3, value=66)) == "66 (0x42)"
     assert told("steps-run", Answer(3, value=1_600)) == "1600 steps"

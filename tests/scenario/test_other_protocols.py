@@ -9,13 +9,19 @@ from textwrap import dedent
 
 import pytest
 
-from sacbus.links import LinkError
+from sacbus.configuration import check
+from sacbus.kernel import Kernel, LineRate
+from sacbus.links import Line, LinkError
+from sacbus.mother.masters import Came
 from sacbus.mother.superstepper_words import COMMANDS
 from sacbus.scenario import run, run_on_link, run_real
+from sacbus.scenario.bench import far_bench
+from tests.mother.third_party import install
 from tests.scenario.stage import failures, mistakes, played, scenario
 from tests.serving import served
 
 HEAD = '[[bus]]\n[[bus.nodes]]\naddresses = "0,3"\nkind = "ss-mst67"\n'
+SAC = '[[bus]]\n[[bus.nodes]]\naddresses = "10"\n'
 NINE = HEAD + 'jmp2 = "closed"\n'
 
 
@@ -133,6 +139,45 @@ def test_words_of_9_bits_take_a_link_that_can_mark_them(tmp_path: Path) -> None:
     assert [str(failure) for failure in result.failures] == []
 
 
+UNMARKED = """
+    [[step]]
+    raw = "1f 00"
+    [[step]]
+    expect = { silence = "100 ms" }
+    [[step]]
+    send = "3 status"
+    says = "at rest"
+    """
+
+
+def test_bytes_are_not_marked_unless_they_are_said_to_be(tmp_path: Path) -> None:
+    assert failures(tmp_path / "a.toml", UNMARKED, NINE) == []
+    (told,) = failures(tmp_path / "a.toml", UNMARKED.replace("1f", "^1f"), NINE)
+    assert "expected silence" in told
+
+
+@pytest.mark.slow
+def test_nor_are_they_in_real_time_or_on_a_link(tmp_path: Path) -> None:
+    one = scenario(tmp_path / "a.toml", UNMARKED, NINE)
+    assert [str(failure) for failure in run_real(one).failures] == []
+    model = ("--kind", "ss-mst67", "--set", "jmp2=closed", "--nodes", "0,3", "--baud", "9600")
+    with served("--ephemeral", *model, "--rfc2217", "0") as sacbus:
+        result = run_on_link(one, sacbus.ready["links"][0]["url"])
+    assert [str(failure) for failure in result.failures] == []
+
+
+@pytest.mark.slow
+def test_bytes_alone_take_a_link_that_marks_them_too(tmp_path: Path) -> None:
+    one = scenario(tmp_path / "a.toml", '[[step]]\nraw = "1f 00"\n', NINE)
+    model = ("--kind", "ss-mst67", "--set", "jmp2=closed", "--nodes", "0,3", "--baud", "9600")
+    port = str(tmp_path / "port")
+    with (
+        served("--ephemeral", *model, "--pty", port),
+        pytest.raises(LinkError, match="no ninth bits there"),
+    ):
+        run_on_link(one, port)
+
+
 def test_lines_of_each_are_polled_in_turn(tmp_path: Path) -> None:
     text = """
         [[step]]
@@ -166,6 +211,27 @@ def test_what_an_answer_brings_is_told_and_must_be_as_expected(tmp_path: Path) -
         "0.000000 s  mother: to 3 '02 03', read the word at RAM 0x03",
         "0.003225 s  3: ACK 32000 to master",
     )
+
+
+def test_a_mere_acknowledge_says_ack_as_it_is_printed_with_what_the_module_has_seen(
+    tmp_path: Path,
+) -> None:
+    text = """
+        [[step]]
+        send = ["3 stop", "3 write 0x10 1"]
+        says = "ACK"
+        [[step]]
+        send = "3 stop"
+        says = "at rest"
+        [[step]]
+        raw = "19 04 0f a0 00 0a ff ff ff ff ff"
+        [[step]]
+        wait = "100 ms"
+        send = "3 stop"
+        says = "ACK (it has seen: overrun)"
+        """
+    (told,) = failures(tmp_path / "a.toml", text, HEAD)
+    assert "expected '3 stop' to be answered 'at rest', got ack, at" in told
 
 
 def test_a_polled_answer_is_told_with_what_it_brings(tmp_path: Path) -> None:
@@ -206,6 +272,31 @@ def test_what_became_of_lines_is_in_the_recording(tmp_path: Path) -> None:
         (3, "status", "ack", 1),
         (9, "stop", "no answer", 3),
     ]
+
+
+def test_bytes_are_played_where_the_master_is_broken_and_lines_are_refused_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path, "sac = nowhere:MASTER")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    raw = '[[step]]\nraw = "02"\n[[step]]\nexpect = { acks = 0 }\n'
+    assert failures(tmp_path / "a.toml", raw, SAC) == []
+    assert mistakes(tmp_path / "a.toml", SAC + '[[step]]\nsend = "10"\n') == [
+        (
+            "step[0].send: the master of 'sac' (nowhere:MASTER) cannot be loaded: "
+            "ModuleNotFoundError(\"No module named 'nowhere'\"); mend or uninstall its package, "
+            "line 5, or give bytes, as raw"
+        )
+    ]
+
+
+def test_a_line_that_was_gone_before_the_first_line_is_gone_for_that_too(tmp_path: Path) -> None:
+    one = scenario(tmp_path / "a.toml", '[[step]]\nraw = "02"\n', SAC)
+    bench = far_bench("bus", Kernel(), check(one.buses[0]), Line("far"), LineRate(), 0)
+    bench.lose("it is gone")
+    came: list[Came] = []
+    bench.master.ask("10", came.append)
+    assert [str(one) for one in came] == ["lost (it is gone)"]
 
 
 def test_wrong_words_are_named_before_anything_is_played(tmp_path: Path) -> None:

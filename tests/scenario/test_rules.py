@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from sacbus.bus import Dead
 from sacbus.config import ConfigError
-from sacbus.configuration import Configuration
+from sacbus.configuration import Configuration, check
 from sacbus.kernel import SECOND
-from sacbus.node import SettingError
+from sacbus.node import Protocol, SettingError
 from sacbus.scenario import (
     Bounds,
     Counted,
@@ -31,6 +33,7 @@ from sacbus.scenario import (
 )
 from sacbus.scenario.rules import refuse
 from sacbus.scenario.values import Deed
+from tests.mother.third_party import install
 
 BUS = Configuration(nodes=(10, 11))
 MODULES = Configuration(nodes=(30,), kind="ss-mst67")
@@ -157,6 +160,55 @@ def test_a_module_that_is_not_there_is_missed_unless_another_outcome_is_expected
         "steps[0].send: expected nodes of bus 'bus' (30), got 0, 'x', correct it"
     ]
     refuse(Scenario("x", (MODULES,), (Step(Send(("0 stop",), "no answer")),)))
+
+
+def test_what_a_sac_says_is_not_asked_for() -> None:
+    told = refusals(Step(Send(("10", "0y"), says="ACK")))
+    assert told == [
+        "steps[0].says: expected a protocol whose answers bring words, got sac, 'x', remove it"
+    ]
+    assert refusals(Step(Send(("10",), "any", says="ACK"))) == [
+        "steps[0].says: expected only with outcome ack, got any, 'x', remove it"
+    ]
+
+
+CRIER = """
+from sacbus.mother.masters import Addressed
+from sacbus.mother.superstepper_master import SuperStepperMasterKind
+
+class Crier(SuperStepperMasterKind):
+    def read(self, line):
+        return Addressed(0, line[4:], True) if line.startswith("all ") else super().read(line)
+
+MASTER = Crier()
+"""
+
+
+def test_what_nobody_answers_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, "superstepper = crier:MASTER")
+    (tmp_path / "crier.py").write_text(CRIER)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    refuse(Scenario("x", (MODULES,), (Step(Send(("all stop", "30 stop"))),)))
+    with pytest.raises(ConfigError) as wrong:
+        refuse(Scenario("x", (MODULES,), (Step(Send(("all stop", "30 stop"), says="ACK")),)))
+    assert [str(one) for one in wrong.value.mistakes] == [
+        (
+            "steps[0].says: expected only with lines that are answered, got 'all stop' to all, "
+            "'x', remove it"
+        )
+    ]
+
+
+def test_a_bus_is_looked_at_once_for_all_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[Configuration] = []
+
+    def look(bus: Configuration) -> Protocol:
+        looked.append(bus)
+        return check(bus)
+
+    monkeypatch.setattr("sacbus.scenario.rules.check", look)
+    refuse(Scenario("x", (BUS,), (Step(Send(("10",))),) * 20))
+    assert looked == [BUS]
 
 
 def test_a_protocol_without_a_master_takes_bytes_alone(monkeypatch: pytest.MonkeyPatch) -> None:

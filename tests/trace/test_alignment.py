@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
+from random import Random
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,6 +40,12 @@ def told(expected: list[Entry], got: list[Entry], within: int = 0) -> list[tuple
         # Of two alike it is told which of them has no like at its time.
         ("aaa aaa", "aaaaaaa", [(300, NOTHING, "a")]),
         ("aaaaaaa", "aaa aaa", [(300, "a", NOTHING)]),
+        # What came in time between two that did not is no other one, and not missing.
+        ("abcdefghij", " b defghij", [(0, "a", NOTHING), (200, "c", NOTHING)]),
+        ("abcdefghij", "a c efghij", [(100, "b", NOTHING), (300, "d", NOTHING)]),
+        ("pqpqpqpqpq", "pqpq q qpq", [(400, "p", NOTHING), (600, "p", NOTHING)]),
+        ("aaaaaa", "     a", [(100 * at, "a", NOTHING) for at in range(5)]),
+        ("abcdefghij", "abxde yhij", [(200, "c", "x"), (500, "f", NOTHING), (600, "g", "y")]),
     ],
 )
 def test_what_has_no_like_is_told_where_it_stands(
@@ -130,3 +139,128 @@ def test_one_that_is_put_in_anywhere_is_all_that_is_told(text: str, data: st.Dat
     found = list(walk(expected, [*expected[:place], extra, *later], 0))
     assert found[0] == (extra.when, NOTHING, "!")
     assert len(found) == 1 + bool(shift and later)
+
+
+@st.composite
+def with_some_of_it(draw: st.DrawFn) -> tuple[list[Entry], set[int]]:
+    """A sequence of few or of many words at times of all kinds, and some places of it."""
+    words = st.integers(0, draw(st.sampled_from([0, 1, 2, 7, 1_000])))
+    said = draw(st.lists(st.tuples(st.integers(1, 50), words), min_size=1, max_size=80))
+    times = accumulate(apart for apart, _ in said)
+    sequence = [Entry(when * MS, f"w{word}") for when, (_, word) in zip(times, said, strict=True)]
+    return sequence, draw(st.sets(st.integers(0, len(sequence) - 1), max_size=5))
+
+
+@given(with_some_of_it())
+def test_several_that_are_missing_or_too_much_are_all_that_is_told(
+    drawn: tuple[list[Entry], set[int]],
+) -> None:
+    sequence, places = drawn
+    fewer = [one for place, one in enumerate(sequence) if place not in places]
+    some = [sequence[place] for place in sorted(places)]
+    assert list(walk(sequence, fewer, 0)) == [(one.when, one.words, NOTHING) for one in some]
+    assert list(walk(fewer, sequence, 0)) == [(one.when, NOTHING, one.words) for one in some]
+
+
+@given(with_some_of_it(), st.data())
+def test_of_what_came_in_time_nothing_is_told_whatever_is_missing_or_put_in(
+    drawn: tuple[list[Entry], set[int]], data: st.DataObject
+) -> None:
+    sequence, gone = drawn
+    put_in = data.draw(st.sets(st.integers(0, len(sequence) - 1), max_size=5))
+    got = []
+    for place, one in enumerate(sequence):
+        if place in put_in:
+            got.append(Entry(one.when - MS // 2, f"put in {place}"))
+        if place not in gone:
+            got.append(one)
+    missing = {(sequence[place].when, sequence[place].words) for place in gone}
+    found = list(walk(sequence, got, 0))
+    assert {(when, one) for when, one, _ in found if one != NOTHING} == missing
+    extra = [other for _, _, other in found if other != NOTHING]
+    assert extra == [f"put in {place}" for place in sorted(put_in)]
+
+
+@given(
+    st.lists(st.integers(1, 50), min_size=1, max_size=80),
+    st.dictionaries(st.integers(0, 79), st.integers(1, 200), max_size=3),
+)
+def test_each_that_is_put_in_and_shifts_the_rest_is_told_and_each_shift(
+    apart: list[int], put_in: dict[int, int]
+) -> None:
+    expected = [Entry(when * MS, f"{place}") for place, when in enumerate(accumulate(apart))]
+    got, shift = [], 0
+    for place, one in enumerate(expected):
+        if place in put_in:
+            got.append(Entry(one.when + shift, "!"))
+            shift += put_in[place] * MS
+        got.append(Entry(one.when + shift, one.words))
+    extra = sum(place < len(expected) for place in put_in)
+    found = list(walk(expected, got, 0))
+    assert [other for _, one, other in found if one == NOTHING] == ["!"] * extra
+    assert len(found) == 2 * extra
+
+
+def test_some_20_of_a_loop_are_missing_and_not_late() -> None:
+    expected = entries("pq" * 40)
+    missing = [(one.when, one.words, NOTHING) for one in expected[20:42]]
+    assert list(walk(expected, expected[:20] + expected[42:], 0)) == missing
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_shift_beyond_what_entries_are_apart_is_seen_by_rows_that_are_said_once(
+    seed: int,
+) -> None:
+    text = "".join(Random(seed).choices("abcdefgh", k=60))
+    got = [*entries(text[:30]), Entry(3_050 * MS, "!"), *entries(text[30:], since=3_130)]
+    assert [other for _, _, other in told(entries(text), got)] == [
+        "!",
+        f"{text[30]} +{130 * MS} ns off",
+    ]
+
+
+def test_a_loop_behind_something_else_is_found_as_late_as_all_is() -> None:
+    loop = "pqr" * 30
+    expected = entries("abcd" + "x" * 20 + loop)
+    got = entries("abcd" + "y" * 20 + loop, since=1_000)
+    found = told(expected, got)
+    assert found[0] == (0, "a", f"a +{1_000 * MS} ns off")
+    assert [pair for _, *pair in found[1:]] == [["x", "y"]] * 20
+
+
+class Words(str):
+    """Words that count how often they are looked at."""
+
+    __slots__ = ()
+    looks = 0
+
+    def __eq__(self, other: object) -> bool:
+        Words.looks += 1
+        return str.__eq__(self, other)
+
+    def __hash__(self) -> int:
+        Words.looks += 1
+        return str.__hash__(self)
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "jitter", "most"),
+    [
+        (("a{at}", "a{at}"), ("b{at}", "b{at}"), 0, 200),
+        (("a", "b"), ("a", "b"), 5_000, 5),
+        (("a{at}", "p"), ("b{at}", "p"), 0, 400),
+    ],
+    ids=["all other words", "all jitters", "every second is another one"],
+)
+def test_the_work_grows_as_the_sequences_do(
+    ours: tuple[str, str], theirs: tuple[str, str], jitter: int, most: int
+) -> None:
+    random, count = Random(3), 2_000
+    both = []
+    for words in (ours, theirs):
+        said = [Words(words[at % 2].format(at=at)) for at in range(count)]
+        whens = [at * MS + random.randrange(jitter + 1) for at in range(count)]
+        both.append([Entry(*one) for one in zip(whens, said, strict=True)])
+    Words.looks = 0
+    assert len(list(walk(both[0], both[1], 0))) >= count // 2
+    assert Words.looks < most * count

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import errno
 import json
+import pickle
 import re
 from contextlib import AsyncExitStack
 from io import BytesIO, FileIO
@@ -266,6 +267,62 @@ def test_a_disk_without_any_room_keeps_nothing_even_of_many_nodes() -> None:
         "the recording could not be begun: No space left on device, nothing is kept, "
         "record elsewhere"
     )
+
+
+def test_who_raises_upon_a_cut_off_leaves_nobody_on_the_bus_even_at_the_beginning() -> None:
+    def refuse(fault: RecordingCutOff) -> None:
+        raise fault
+
+    async def main() -> None:
+        # What it tells at its beginning is more than what is written together.
+        async with (
+            open_bus(Configuration(name="a", nodes=tuple(range(20, 240)))) as first,
+            open_bus(Configuration(name="b", nodes=tuple(range(20, 240)))) as second,
+            open_bus(Configuration(name="c", nodes=tuple(range(20, 240)))) as third,
+        ):
+            buses = [first, second, third]
+            with pytest.raises(RecordingCutOff):
+                Recorder(buses, Full(-1), cut_off=refuse)
+            assert not any(bus.bus.medium.watchers for bus in buses)
+            assert not any(bus.bus.report_watchers for bus in buses)
+
+    run_virtual(Kernel(), main())
+
+
+def test_a_cut_off_keeps_nothing_from_another_who_watches() -> None:
+    starts: list[Ns] = []
+
+    async def main() -> int:
+        async with open_bus(Configuration(nodes=(10,))) as bus:
+            Recorder(bus, Full(-1))
+            bus.bus.medium.watchers.append(lambda sent: starts.append(sent.start))
+            mother = bus.mother()
+            for _ in range(300):
+                await mother.send(10, "")
+            return mother.statistics[10].acks
+
+    answered = run_virtual(Kernel(), main())
+    assert len(starts) == 2 * answered == 600
+
+
+def test_a_sink_that_takes_nothing_ends_the_recording() -> None:
+    class Stuck(BytesIO):
+        """A pipe that does not block, while it is full."""
+
+        def write(self, _data: object, /) -> int:
+            return 0
+
+    async def main() -> RecordingCutOff | None:
+        async with open_bus(Configuration(nodes=(10,))) as bus:
+            with Recorder(bus, Stuck()) as recorder:
+                recorder.flush()
+            return recorder.fault
+
+    fault = run_virtual(Kernel(), main())
+    assert fault is not None
+    assert fault.reason == "it takes nothing at present"
+    again = pickle.loads(pickle.dumps(fault))  # noqa: S301 (our own)
+    assert (str(again), again.errno) == (str(fault), errno.EAGAIN)
 
 
 def test_a_sink_without_a_buffer_is_written_whole_and_read_back(tmp_path: Path) -> None:
