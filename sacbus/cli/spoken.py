@@ -14,22 +14,20 @@ from typing import Final
 
 __all__ = ["check_spoken"]
 
-#: What mother speaks, and whoever types at a terminal.
-SAC: Final = "sac"
-
 #: Seconds that the look may take: an emergency stop waits for it.
 PATIENCE: Final = 0.5
 
 
 async def check_spoken(
-    link: str, speaks: str = SAC, advice: Mapping[str, str] = MappingProxyType({})
+    link: str, speaks: str | None = None, advice: Mapping[str, str] = MappingProxyType({})
 ) -> None:
     """LinkError if LINK is that of a bus here which speaks another protocol than ``speaks``.
 
-    ``advice``: what to do about some of the others.
+    ``speaks`` None: what mother does, SAC. ``advice``: what to do about some of the others.
     """
     from sacbus.feed import find
     from sacbus.links import LinkError
+    from sacbus.mother.request import SPEAKS
 
     try:
         async with asyncio.timeout(PATIENCE):
@@ -40,8 +38,9 @@ async def check_spoken(
         return
     spoken = feed.hello.protocol
     await feed.close()
-    if spoken != speaks:
-        commands = "a SAC's commands" if speaks == SAC else f"messages of {speaks}"
+    if spoken not in (SPEAKS if speaks is None else (speaks,)):
+        sac = speaks is None or speaks in SPEAKS
+        commands = "a SAC's commands" if sac else f"messages of {speaks}"
         raise LinkError(
             f"this line speaks {spoken}, to which {commands} mean something else",
             link,
