@@ -1,4 +1,4 @@
-"""What every test is held to: no descriptor left behind, and Hypothesis without a stopwatch."""
+"""What every test is held to: nothing left behind, and Hypothesis without a stopwatch."""
 
 from __future__ import annotations
 
@@ -42,6 +42,14 @@ def open_descriptors() -> dict[str, str]:
             if target.suffix != ".ttf":
                 found[entry.name] = str(target)
     return found
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _state_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test, nor a process of one, keeps or finds anything in the state directory of a person."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -461,7 +461,7 @@ def test_a_served_bus_is_played_on_over_its_pty(file: Path) -> None:
     file.write_text(PASSES.replace('node = 10, position = 40, state = "STANDBY"', "acks = 1"))
     page = file.with_suffix(".html")
     with (
-        served("--nodes", "10") as bus,
+        served("--ephemeral", "--nodes", "10") as bus,
         started("run", str(file), "--link", bus.link, "--report", str(page)) as player,
     ):
         assert player.wait() == 0

@@ -361,6 +361,15 @@ class SacBoard:
         """About a command that runs later than it came, or else about the line that has come."""
         self.tell(kind, text, self.messages.line if command is None else command, 0)
 
-    def tell(self, kind: ReportKind, text: str, line: str = "", column: int = 0) -> None:
-        """Report something, now."""
-        self._tell_bus(Report(self.now, self.network.address, kind, text, line, column))
+    def tell(
+        self,
+        kind: ReportKind,
+        text: str,
+        line: str = "",
+        column: int = 0,
+        *,
+        when: Ns | None = None,
+    ) -> None:
+        """Report something of now, or of ``when``, which was heard of only now."""
+        at = self.now if when is None else when
+        self._tell_bus(Report(at, self.network.address, kind, text, line, column))

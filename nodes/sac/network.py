@@ -70,8 +70,8 @@ class PortOwner(Protocol):
         """
         ...
 
-    def tell(self, kind: ReportKind, text: str) -> None:
-        """Something worth a report."""
+    def tell(self, kind: ReportKind, text: str, *, when: Ns | None = None) -> None:
+        """Something worth a report, of now or of ``when``."""
         ...
 
 
@@ -183,7 +183,11 @@ class NetworkPort:
                 if start < size and self._deaf_until > heard.start:
                     start = max(start, heard.begun_before(self._deaf_until))
             elif type(event) is LineFault:
-                self._owner.tell(ReportKind.LOST, f"a packet whose body is over {MAX_BODY} bytes")
+                self._owner.tell(
+                    ReportKind.LOST,
+                    f"a packet whose body is over {MAX_BODY} bytes",
+                    when=heard.ends(start - 1),
+                )
             # An ACK is of no consequence to a SAC: it sends nothing that it would repeat.
         self.receiving = receiver.open or self._waits_for is not None
         self._see_what_is_due()

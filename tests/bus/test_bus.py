@@ -8,7 +8,7 @@ from dataclasses import replace
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from nodes.sac import KIND, SacNode, SacProtocol, SacSettings
@@ -228,6 +228,7 @@ def play(bench: Bench, talk: list[tuple[Ns, bytes]]) -> list[object]:
 @pytest.mark.slow
 @settings(max_examples=150)
 @given(traffic())
+@example([(0, bytes((2, *[0] * 50)))])  # too long, which is seen before the end
 def test_those_whom_the_bus_does_not_bother_would_not_have_done_anything(
     talk: list[tuple[Ns, bytes]],
 ) -> None:

@@ -66,7 +66,9 @@ def _fuzz(lines: int, seed: int, *, quiet: bool) -> int:
     """One job."""
     world, begun = World(seed), time.monotonic()
     try:
-        print(f"seed {seed}: {lines:,} lines", flush=True)
+        # In one piece: several jobs write to one file, which may have no buffer.
+        sys.stdout.write(f"seed {seed}: {lines:,} lines\n")
+        sys.stdout.flush()
         world.go_on(warm_up(lines))
         warm = held()
         while world.lines < lines:

@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from nodes.sac import SacNode
+from nodes.sac.board import SacBoard
 from tests.fuzz.__main__ import main
 from tests.fuzz.lines import Lines
 from tests.fuzz.world import World
@@ -71,10 +71,10 @@ def test_lines_are_of_every_kind() -> None:
 def test_what_raises_is_told_with_what_came_before_it(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def breaks(self: SacNode, line: bytes, now: int) -> None:
+    def breaks(self: SacBoard, line: bytes, now: int) -> None:
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr(SacNode, "line_typed", breaks)
+    monkeypatch.setattr(SacBoard, "line_typed", breaks)
     assert main(["--lines", "20000", "--seed", "5", "--jobs", "1"]) == 1
     told = capsys.readouterr().out.splitlines()
     assert "ZeroDivisionError: on purpose" in told

@@ -161,7 +161,7 @@ def test_what_goes_wrong_while_it_is_played_comes_out(file: Path) -> None:
 
 @pytest.mark.slow
 def test_on_a_link_the_line_is_all_there_is(file: Path) -> None:
-    with served("--nodes", "10,11") as sacbus:
+    with served("--ephemeral", "--nodes", "10,11") as sacbus:
         result = run_on_link(scenario(file, LINE), sacbus.link)
     assert [str(one) for one in result.failures] == []
     assert result.counts["bus"]["retries"] == 2
@@ -171,7 +171,7 @@ def test_on_a_link_the_line_is_all_there_is(file: Path) -> None:
 def test_on_a_link_polling_sends_as_many_lines_as_in_virtual_time(file: Path) -> None:
     one = scenario(file, POLL_FOR)
     assert run(one).failures == []
-    with served("--nodes", "10,11") as sacbus:
+    with served("--ephemeral", "--nodes", "10,11") as sacbus:
         result = run_on_link(one, sacbus.link)
     assert [str(failure) for failure in result.failures] == []
 

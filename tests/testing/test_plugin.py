@@ -568,5 +568,6 @@ def test_who_has_no_bus_loads_nothing_of_it(pytester: pytest.Pytester) -> None:
     result = pytester.run(
         sys.executable, "-m", "pytest", "-p", "no:asyncio", "-p", "no:randomly",
         "-p", "no:hypothesispytest", "-p", "no:anyio", "-c", Path("/dev/null"), "--rootdir=.",
+        "--confcutdir=.",  # or whatever lies in the directories above would be looked at, too
     )  # fmt: skip
     result.assert_outcomes(passed=1)
