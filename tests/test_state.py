@@ -266,6 +266,7 @@ def test_a_missing_file_is_told(tmp_path: Path) -> None:
     )
 
 
-def test_the_default_directory_is_the_users_own() -> None:
+def test_the_default_directory_is_the_users_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("XDG_STATE_HOME")  # which keeps tests out of it
     assert default_directory().name == "sacbus"
     assert default_directory().is_relative_to(Path.home())
