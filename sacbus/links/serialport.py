@@ -222,7 +222,7 @@ class SerialConnection(asyncio.Protocol):
                     super(_Port, self.port).flush()
         except FAULTS as fault:
             if not self._ended:
-                self._loop.call_soon_threadsafe(self._failed, _words(fault))
+                self._failed(_words(fault))
 
     def set_dtr(self, *, asserted: bool) -> bool:
         """Set the DTR output now; False where there is none, or the port is gone."""
@@ -281,10 +281,13 @@ class SerialConnection(asyncio.Protocol):
             self._transport.resume_reading()
 
     def _failed(self, why: str) -> None:
-        """The port's: it is gone. Told at the loop's next turn, since the transport is busy now."""
+        """The port's: it is gone. Told at the loop's next turn, since the transport is busy now.
+
+        From any thread: marked bytes are written in one of their own.
+        """
         if not self._failing:
             self._failing = True
-            self._loop.call_soon(self._end, why)
+            self._loop.call_soon_threadsafe(self._end, why)
 
     def _end(self, why: str) -> None:
         if not self._ended:

@@ -224,3 +224,16 @@ async def test_marked_bytes_of_one_call_are_out_before_those_of_the_next(
     assert len(threads) == 1
     assert pty.read() == b"abcd"
     assert pty.lost == []
+
+
+async def test_a_port_that_is_lost_under_marked_bytes_is_told_of_by_their_thread(pty: Pty) -> None:
+    asyncio.get_running_loop().set_debug(True)  # it refuses what is not safe from a thread
+    connection = pty.connect()
+    await turn_the_loop()
+    # Not to be told of by the reader.
+    connection.hold(held=True)
+    await turn_the_loop()
+    pty.hang_up()
+    assert await asyncio.to_thread(connection.port.write, b"a") == 0
+    await turn_the_loop()
+    assert len(pty.lost) == 1
