@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from sacbus.bus import PLAIN_BITS
 from sacbus.links.places import AdapterAt, Place
 from sacbus.node import (
     NodeKind,
@@ -119,7 +118,7 @@ def check(configuration: Configuration) -> Protocol:
             )
         if not configuration.pace:
             raise SettingError("pace: expected true with a real adapter, which keeps real time")
-        if protocol.rate.bits > PLAIN_BITS:
+        if protocol.rate.nine:
             raise SettingError(
                 f"links: an adapter hears no ninth bits, which {protocol.name} has; use a pty, TCP "
                 "or RFC 2217"

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from functools import partial
 from random import Random
 
-from sacbus.bus import FULL, LATENCY, PLAIN_BITS, Bus, Fault, FaultOn, LivePort, NoSuchNode, Port
+from sacbus.bus import FULL, LATENCY, Bus, Fault, FaultOn, LivePort, NoSuchNode, Port
 from sacbus.configuration import Configuration, NodeAt
 from sacbus.console import Console
 from sacbus.host import Host, VirtualHost
@@ -230,7 +230,7 @@ class HostedBus:
     def _seat(self, link: Link, *, echo: bool, latency: Ns) -> Port:
         rate = self.bus.rate
         noise = Random(self.configuration.seed)
-        tuning = Tuning(link, rate.baud, noise, self.tell, bits=rate.bits)
+        tuning = Tuning(link, rate.baud, noise, self.tell, nine=rate.nine)
 
         def hear(heard: Heard, _now: Ns) -> None:
             link.send(tuning.to_client(heard.data))
@@ -251,7 +251,7 @@ class HostedBus:
         port = Port(self.bus.medium, hear, latency=latency, echo=echo, hold=hold)
         try:
             # A quick program's bytes may be delivered before this comes back.
-            link.open(deliver_nine if rate.bits > PLAIN_BITS else deliver)
+            link.open(deliver_nine if rate.nine else deliver)
         except BaseException:
             port.close()
             raise

@@ -21,7 +21,17 @@ from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from typing import Any, Final
 
-__all__ = ["MS", "SECOND", "US", "Appointment", "Kernel", "LineRate", "Ns"]
+__all__ = [
+    "MS",
+    "NINE_BITS",
+    "PLAIN_BITS",
+    "SECOND",
+    "US",
+    "Appointment",
+    "Kernel",
+    "LineRate",
+    "Ns",
+]
 
 Ns = int
 """Nanoseconds of bus time since the kernel's start. Always an int."""
@@ -30,19 +40,28 @@ US: Final = 1_000
 MS: Final = 1_000_000
 SECOND: Final = 1_000_000_000
 
+#: Bits of a byte on a line: start, eight, stop; and on one with ninth bits.
+PLAIN_BITS: Final = 10
+NINE_BITS: Final = 11
+
 
 @dataclass(frozen=True, slots=True)
 class LineRate:
-    """How long bytes take: ``bits`` each (10 for 8N1, 11 with a ninth bit) at ``baud``."""
+    """How long bytes take: ``bits`` each (PLAIN_BITS or NINE_BITS) at ``baud``."""
 
     baud: int = 38_400
-    bits: int = 10
+    bits: int = PLAIN_BITS
     #: The spans of short runs: every packet asks for several.
     _short: tuple[Ns, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         spans = tuple(count * self.bits * SECOND // self.baud for count in range(64))
         object.__setattr__(self, "_short", spans)
+
+    @property
+    def nine(self) -> bool:
+        """Whether bytes have a ninth bit."""
+        return self.bits == NINE_BITS
 
     def span(self, count: int) -> Ns:
         """Line time of ``count`` bytes in a row, ns, truncated once for all of them together."""

@@ -10,15 +10,16 @@ from sacbus.bus.hearing import Cut, Dead, Echo, LateDirection, Latency, WrongBau
 from sacbus.bus.live_port import LivePort
 from sacbus.bus.medium import LaneCounters, Medium
 from sacbus.bus.passage import EVERY_LINK, Passage
-from sacbus.bus.port import FULL, LATENCY, PLAIN_BITS, Port
+from sacbus.bus.port import FULL, LATENCY, Port
 from sacbus.bus.transmission import Transmission
+from sacbus.kernel import NINE_BITS
 
 __all__ = [
     "EVERY_LINK",
     "FAULTS",
     "FULL",
     "LATENCY",
-    "PLAIN_BITS",
+    "NINE_BITS",
     "Babble",
     "BitErrors",
     "Bus",

@@ -13,7 +13,7 @@ from sacbus.bus.medium import Medium
 from sacbus.kernel import MS, Ns
 from sacbus.node import Heard
 
-__all__ = ["FULL", "LATENCY", "PLAIN_BITS", "Port"]
+__all__ = ["FULL", "LATENCY", "Port"]
 
 #: A paced link starts to send no earlier than this after the line went idle, as a USB adapter's
 #: round trip makes it; so a quick client does not fall into a node's deaf time.
@@ -28,9 +28,6 @@ CHUNK: Final = 4_096
 #: which they are before it may go on. A system's own buffers before a UART are of this order.
 FULL: Final = 16_384
 LOW: Final = 4_096
-
-#: Bits of a byte on a line without ninth bits: start, eight, stop.
-PLAIN_BITS: Final = 10
 
 
 class Port:
@@ -79,7 +76,7 @@ class Port:
         self._latency = latency
         self._buffer = bytearray()
         #: Their ninth bits, on a line that has some.
-        self._ninth = bytearray() if medium.rate.bits > PLAIN_BITS else None
+        self._ninth = bytearray() if medium.rate.nine else None
         #: True while an appointment to start or to go on sending stands.
         self._waiting = False
         #: When the port's own last transmission ends.

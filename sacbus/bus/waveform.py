@@ -8,14 +8,10 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import Final
 
 from sacbus.kernel import SECOND, LineRate, Ns
 
 __all__ = ["resampled"]
-
-#: Bits of a byte on a line with ninth bits.
-_NINE: Final = 11
 
 
 def resampled(
@@ -49,7 +45,7 @@ def resampled(
         value = sum(bit << place for place, bit in enumerate(bits[:8]))
         after = start + (2 * of.bits - 1) * SECOND // (2 * at.baud)
         lacks_stop = 1 - _level(edges, levels, after)
-        found.append((start, value, bits[8] if of.bits == _NINE else 0, lacks_stop))
+        found.append((start, value, bits[8] if of.nine else 0, lacks_stop))
         index += 1
 
 
@@ -62,7 +58,7 @@ def _edges(
     level = 1
     for index, value in enumerate(values):
         bits = [0, *(value >> place & 1 for place in range(8))]
-        if rate.bits == _NINE:
+        if rate.nine:
             bits.append(ninth[index] if ninth is not None else 1)
         for place, bit in enumerate((*bits, 1)):
             if bit != level:

@@ -10,13 +10,10 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Final
 
-__all__ = ["NINE_BITS", "PARITIES", "runs"]
+__all__ = ["PARITIES", "runs"]
 
 #: pyserial's words for a ninth bit of 0 and of 1: space and mark.
 PARITIES: Final = ("S", "M")
-
-#: Bits of a byte on a line with ninth bits: start, nine, stop.
-NINE_BITS: Final = 11
 
 
 def runs(data: bytes, ninth: bytes) -> Iterator[tuple[str, bytes]]:

@@ -28,9 +28,11 @@ from typing import Any
 import serial
 from serial import rfc2217
 
+from sacbus.bus import NINE_BITS
+
 from .client import BOUND, unreachable
 from .errors import LinkError
-from .marking import NINE_BITS, runs
+from .marking import runs
 
 __all__ = ["RemotePort"]
 

@@ -11,10 +11,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final
 
-from sacbus.bus import PLAIN_BITS
-
 from .link import FormattedLink, Link, SerialFormat
-from .marking import NINE_BITS
 
 __all__ = ["Tuning"]
 
@@ -29,7 +26,7 @@ TRUST: Final = 8
 
 #: Parities that a line understands: of 8N1 only none, since the parity bit comes where the stop bit
 #: should be; where a ninth bit is, those that give it one value, and none (a second stop bit).
-_PARITIES: Final = {PLAIN_BITS: "N", NINE_BITS: "NMS"}
+_PARITIES: Final = {False: "N", True: "NMS"}
 
 _NINTH: Final = {"M": 1, "S": 0}
 
@@ -64,12 +61,12 @@ class Tuning:
         noise: Random,
         tell: Callable[[str], object],
         *,
-        bits: int = PLAIN_BITS,
+        nine: bool = False,
     ) -> None:
         self._link = link
         self._baud = baud
-        self._nine = bits == NINE_BITS
-        self._parities = _PARITIES[bits]
+        self._nine = nine
+        self._parities = _PARITIES[nine]
         #: What tells the client's format; None for a link that has no such thing.
         self._format = link.client_format if isinstance(link, FormattedLink) else None
         self._noise = noise

@@ -12,9 +12,8 @@ from contextlib import asynccontextmanager
 from typing import Final, runtime_checkable
 from typing import Protocol as Contract
 
-from sacbus.kernel import LineRate, Ns
+from sacbus.kernel import NINE_BITS, LineRate, Ns
 from sacbus.links import open_line
-from sacbus.links.marking import NINE_BITS
 from sacbus.mother.clock import Clock
 from sacbus.mother.errors import BadRequest, MotherError
 from sacbus.mother.exchanges import (

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from sacbus.kernel import LineRate, Ns
-from sacbus.links.marking import NINE_BITS
 from sacbus.mother.clock import Clock
 from sacbus.mother.errors import MotherError
 from sacbus.mother.exchanges import SLACK, Answered, BadChecksum, Exchanges, Nak, NoReply
@@ -64,7 +63,7 @@ class SuperStepperMasterKind:
         unsent: Callable[[], int] | None = None,
     ) -> SuperStepperMaster:
         """A master on a line, in the mode that its bytes tell."""
-        nine = rate.bits == NINE_BITS
+        nine = rate.nine
 
         def talk(data: bytes, ninth: bytes) -> None:
             speak(data, ninth if nine else None)

@@ -10,7 +10,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Final
 
-from sacbus.bus import PLAIN_BITS, Port
+from sacbus.bus import Port
 from sacbus.bus.transmission import Transmission
 from sacbus.hosted import HostedBus
 from sacbus.kernel import MS, LineRate, Ns
@@ -188,7 +188,7 @@ def piped_bench(hosted: HostedBus, link: Link, slack: Ns) -> Bench:
     # The link's end is a pty, which has no ninth bits: where there are some, bytes get on the line
     # beside it, all of them, for a stop bit of 1 stands in that place of a pty's.
     beside = Port(bus.medium, _deaf, latency=0, name="mother")
-    nine = bus.rate.bits > PLAIN_BITS
+    nine = bus.rate.nine
 
     def send(data: bytes) -> None:
         say(data, None)
@@ -215,7 +215,7 @@ def far_bench(
 
     On a line with ninth bits the link must be one that can mark bytes.
     """
-    nine = rate.bits > PLAIN_BITS
+    nine = rate.nine
 
     def send(data: bytes) -> None:
         say(data, None)

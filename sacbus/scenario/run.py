@@ -13,7 +13,6 @@ from contextlib import AsyncExitStack, contextmanager, suppress
 from io import BytesIO
 from typing import Any, BinaryIO, Final
 
-from sacbus.bus import PLAIN_BITS
 from sacbus.configuration import Configuration, check
 from sacbus.daemon import open_bus
 from sacbus.host import Standstill, run_virtual
@@ -148,9 +147,7 @@ async def _far(scenario: Scenario, link: str, progress: Progress | None) -> Resu
     rate = LineRate(bus.baud or protocol.rate.baud, protocol.rate.bits)
     loop = asyncio.get_running_loop()
     async with open_line(link, rate.baud) as line:
-        if rate.bits > PLAIN_BITS and any(
-            isinstance(one.does, Send | Poll | Raw) for one in scenario.steps
-        ):
+        if rate.nine and any(isinstance(one.does, Send | Poll | Raw) for one in scenario.steps):
             line.check_marking()
         clock = LoopClock(loop)
         bench = far_bench(bus.name, clock, protocol, line, rate, LINK_SLACK)

@@ -171,7 +171,7 @@ def test_the_wrong_format_garbles_and_is_told_in_words() -> None:
 
 def test_mark_and_space_set_the_ninth_bit_of_the_bytes_that_follow() -> None:
     desk, heard = Desk(), list[tuple[bytes, int | None]]()
-    tuning = Tuning(desk.link, 38_400, Random(0), str, bits=11)
+    tuning = Tuning(desk.link, 38_400, Random(0), str, nine=True)
     program = desk.opens(lambda data: heard.append((tuning.from_client(data), tuning.ninth())))
     program.write(b"none" + sets(3, 4) + b"head" + sets(3, 5) + b"tail")
     assert heard == [(b"none", None), (b"head", 1), (b"tail", 0)]

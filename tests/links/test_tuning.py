@@ -95,7 +95,7 @@ def test_a_client_that_only_listens_is_looked_at_too() -> None:
 def spoils(form: SerialFormat, bits: int) -> bool:
     link = FormattedMemory(baud=38_400)
     link.format = form
-    tuning = Tuning(link, 38_400, Random(0), str, bits=bits)
+    tuning = Tuning(link, 38_400, Random(0), str, nine=bits == 11)
     assert (tuning.from_client(BYTES) == BYTES) == (tuning.to_client(BYTES) == BYTES)
     return tuning.from_client(BYTES) != BYTES
 
@@ -136,7 +136,7 @@ def test_a_line_with_ninth_bits_says_so_where_a_format_is_wrong() -> None:
     told: list[str] = []
     link = FormattedMemory(where="somewhere", baud=38_400)
     link.format = SerialFormat(8, "E", 1)
-    Tuning(link, 38_400, Random(0), told.append, bits=11).from_client(BYTES)
+    Tuning(link, 38_400, Random(0), told.append, nine=True).from_client(BYTES)
     (text,) = told
     assert text.endswith("has set 8E1, the line is 8N1 with a ninth bit: bytes arrive garbled")
 
@@ -145,6 +145,6 @@ def test_a_line_with_ninth_bits_says_so_where_a_format_is_wrong() -> None:
 def test_parity_is_the_ninth_bit_where_there_is_one(parity: str, ninth: int | None) -> None:
     link = FormattedMemory(baud=38_400)
     link.format = SerialFormat(8, parity)
-    assert Tuning(link, 38_400, Random(0), str, bits=11).ninth() == ninth
-    assert Tuning(link, 38_400, Random(0), str, bits=10).ninth() is None
-    assert Tuning(MemoryLink(), 38_400, Random(0), str, bits=11).ninth() is None
+    assert Tuning(link, 38_400, Random(0), str, nine=True).ninth() == ninth
+    assert Tuning(link, 38_400, Random(0), str).ninth() is None
+    assert Tuning(MemoryLink(), 38_400, Random(0), str, nine=True).ninth() is None
